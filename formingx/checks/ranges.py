@@ -15,9 +15,9 @@ from .sizes import Body
 _LARGEST_FRICTION = 5.0         # coefficient of friction; rubber on dry steel has 1 to 4
 _LONGEST_IN_METRES = 5.0        # longest body whose length may be in metres
 _SHORTEST_IN_MICROMETRES = 1e3  # shortest body whose length may be in micrometres
-_LARGEST_MODULUS_IN_MM = 1e5    # shear modulus for a length in mm: 100 GPa in MPa, 100 MPa in kPa, 690 MPa in psi
 _SMALLEST_MODULUS = 1e-7        # shear modulus: 0.1 Pa in MPa
 _LARGEST_MODULUS = 1e11         # shear modulus: 100 GPa in Pa
+_LARGEST_MODULUS_IN_MM = _LARGEST_MODULUS / 1e6   # for a length in mm: 100 GPa in MPa, 100 MPa in kPa, 690 MPa in psi
 _LARGEST_WEIGHT = 1e3           # weight over shear modulus; above it no body is in equilibrium
 _SMALLEST_WEIGHT = 1e-10        # weight over shear modulus; below it has no effect
 

@@ -14,6 +14,7 @@ from ..materials.inflation import FreeInflation, Peak, first_peak
 from ..measures.targets import Target
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
+from ..scene.contact_checks import OTHER_UNIT
 from ..scene.scene import Scene
 from ..solve.stage import Stage
 from ..tools.shapes import Tool
@@ -28,7 +29,6 @@ _ABOVE_PEAK = 1.1          # pressure over the maximum of a spherical cap, which
 _REMAINING_PRESSURE = 0.8  # lowest pressure beyond the limit point of a tube over its maximum (tests/test_check.py)
 _BLOW_RATIO = 8.0          # largest blow ratio of bottles
 _MOULD_DEPTH = 0.5         # height of a wall over the opening: a mould is higher, a grip lower
-_WIDTH_RATIO = 4.0         # width of a sheet over its mould, or the inverse, that suggests different units
 _CORNER_ANGLE = 10.0       # degrees by which a profile turns at a sharp corner
 _POSITIONS = 400           # number of examined positions of a moving tool
 _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an exponent above 2) does"
@@ -334,8 +334,8 @@ def _mould_sizes(body: Body) -> Found:
             continue
         bottom, flange = outline[[np.argmin(reach), np.argmax(reach)], 1] - face[:, 1].mean()
         gap = float(-contact.tool.signed_distance(face).max())
-        narrow = reach.max() < radius / _WIDTH_RATIO
-        if abs(bottom) > abs(flange) and (narrow or reach.max() > _WIDTH_RATIO * radius and radius < gap < 20 * radius):
+        narrow = reach.max() < radius / OTHER_UNIT
+        if abs(bottom) > abs(flange) and (narrow or reach.max() > OTHER_UNIT * radius and radius < gap < 20 * radius):
             what = "reaches to" if narrow else f"is {body.format(gap, 'travel')} away, and reaches to"
             yield Finding("warning", repr(contact),
                           f"the mould {what} R = {body.format(float(reach.max()), 'travel')}, the sheet to"

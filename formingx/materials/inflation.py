@@ -11,7 +11,7 @@ import numpy as np
 from .homogeneous import in_plane_stretches
 from .material import Material
 
-_HALVINGS = 60             # bisections of the axial stretch, down to round-off
+_HALVINGS = np.finfo(float).nmant + 8      # bisections of the axial stretch, down to round-off
 
 
 class Peak(NamedTuple):

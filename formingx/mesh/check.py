@@ -11,7 +11,7 @@ from .compiled import compiled
 from .edges import edges_of
 
 _MIN_LENGTH = 1e-50                      # lengths whose squares are still numbers
-_MAX_LENGTH = 1e50                        # lengths whose products are still numbers
+_MAX_LENGTH = 1 / _MIN_LENGTH             # lengths whose products are still numbers
 _MIN_AREA = 1e-12                          # area over the square of the longest edge that counts as 0
 
 

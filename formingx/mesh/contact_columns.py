@@ -73,9 +73,12 @@ _ON_FLAT = 2.0
 """Length of a column on a flat face of a tool over that on a fillet whose radius is the radius of the free surface when
 the sheet touches. A thin sheet leaves the face within this length; longer columns touch too late."""
 
-_ON_CONVEX, _ON_CONCAVE = 0.25, 0.14
-"""Relative error of the wall on a fillet, over the square of wall / (fillet radius times elements through the sheet).
-On convex ones, over which the sheet is drawn, 0.09 to 0.25 was found in five moulds, on concave ones 0.09 to 0.17."""
+_ON_CONVEX = 0.25
+"""Relative error of the wall on a convex fillet, over which the sheet is drawn, over the square of wall / (fillet
+radius times elements through the sheet): 0.09 to 0.25 in five moulds."""
+
+_ON_CONCAVE = 0.14
+"""The same quotient on a concave fillet: 0.09 to 0.17 in five moulds."""
 
 _SHARPEST = 1.0
 """Largest wall over fillet radius for which the elements through the sheet are chosen. At 1.5 "draft" has an error of

@@ -25,7 +25,7 @@ from .evaluate.dissipation import dissipated_energy
 from .evaluate.profile import Profiles
 from .evaluate.stress import Stresses
 
-_ROUNDING_ERROR = 5e-6
+_ROUNDING_ERROR = 0.5 * 10.0 ** (1 - 6)
 """Largest relative error of a number that is rounded to six digits."""
 
 
