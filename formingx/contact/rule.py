@@ -185,7 +185,7 @@ class Lobatto(_Nodes):
     def edges(self) -> np.ndarray:
         """Indices of the end nodes and the middle node of each edge of the face on all ranks, shape (m, 3).
 
-        The indices count the points of all ranks, in the order of the ranks.
+        The contact points are these nodes. The indices count the points of all ranks, in the order of the ranks.
         """
         from scipy.spatial import cKDTree
         X = gathered(self._comm, self._X[_nodes_of(self._facets, self._vectors, self._X)])

@@ -116,7 +116,7 @@ def tool_of(shape: dict[str, Any]) -> Any:
         The tool.
 
     Raises:
-        InputError: the tool is three-dimensional, and the extension is not installed.
+        InputError: the tool is three-dimensional, and `formingx.extensions.space` is not installed.
     """
     if "pieces" in shape:
         pieces: list[Line | Arc] = []

@@ -46,7 +46,7 @@ class History(Protocol):
         Args:
             x: unknowns of the state, locally owned entries, shape (n,).
             control: load parameter (control) of the state, dimensionless.
-            start: state at the beginning of the step, or None.
+            start: state at the beginning of the step; None for histories that do not depend on it.
         """
 
     def get(self) -> Any:

@@ -114,7 +114,7 @@ class LoadedBody:
             support: the `Support`.
 
         Returns:
-            Energy (UFL, rank 0, user's units), or None.
+            Energy (UFL, rank 0, user's units); None if the support stores no energy.
 
         Raises:
             InputError: the energy is not a UFL form of rank 0.

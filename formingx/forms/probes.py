@@ -120,10 +120,10 @@ class Probe:
         return np.einsum("kj,kij->ki", self._weights, values)
 
     def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
-        """Return the row of a weighted sum of unknowns, locally owned entries.
+        """Return the row of a weighted sum of displacements of points, locally owned entries.
 
-        factors: weights of the points, shape (n, components). point_weights: weights of the unknowns of the cell of
-        each point that this rank evaluates, shape (m, dim).
+        factors: weights of all n points, shape (n, components). point_weights: for the m points in cells of this rank,
+        values of the `dim` shape functions of the cell at the point, shape (m, dim).
         """
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map

@@ -12,7 +12,9 @@ from .matrix import ExtendedMatrix
 
 
 class Tangent:
-    """Derivatives dF/dx and dF/dcontrol of the forms and of the constraints of supports.
+    """Derivatives dF/dx and dF/dcontrol of the residual F, with the constraints of supports.
+
+    x are the unknowns. `matrix` holds dF/dx, and `by_control` returns dF/dcontrol.
 
     Args:
         forms: the `Formulation`.

@@ -239,7 +239,10 @@ class _Program:
 
     @np.errstate(all="ignore")
     def __call__(self, stretches: np.ndarray, constants: Any) -> np.ndarray:
-        """Return the values of the outputs, shape (outputs, n), for stretches, shape (3, n), and constants."""
+        """Return the values of the UFL expressions, shape (outputs, n).
+
+        stretches: principal stretches, shape (3, n). constants: constants of the energy, in the order of `inputs`.
+        """
         values = [*stretches, *constants]
         for operation, operands in self._steps:
             values.append(operation(*[values[i] for i in operands]))

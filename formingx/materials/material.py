@@ -70,7 +70,7 @@ class Material(Energies):
         return {name: value if (found := varying(value)) is None else found for name, value in self.parameters.items()}
 
     def _numbers(self) -> list[float]:
-        """Return the values of the constants, in the order of `parameters`; raise an InputError if they vary."""
+        """Return the values of the constants in the order of `parameters`; InputError if any varies over the body."""
         if self.varies:
             raise InputError(f"{self}: its constants vary over the body: use with_constants([...]) for the material at"
                              f" one point of it")

@@ -46,7 +46,7 @@ class RelaxingMaterial(Relaxing):
         equilibrium: material that describes the relaxed state; None if all stress relaxes.
         branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
         shift: temperature dependence of the relaxation times: `WLF`, `Arrhenius`, or any function aT(T) of an array.
-            The relaxation times are then aT(T) tau, with numbers tau. None: no dependence.
+            The relaxation times are then aT(T) tau, and each tau must be a number. None: no dependence.
 
     Raises:
         InputError: an argument is not allowed.

@@ -74,9 +74,10 @@ class PoleStressRatio:
         return float(stored / relaxed)
 
     def _integrals(self) -> np.ndarray:
-        """Return the integrals of present stress, relaxed stress and largest modulus over the elements at the pole.
+        """Return the integrals of three stresses over the elements at the pole.
 
-        The result has the shape (3,) and is equal on all ranks; collective.
+        These are the present equivalent stress, the equivalent stress after relaxation, and the largest shear modulus
+        of the materials. The result has the shape (3,) and is equal on all ranks; collective.
         """
         totals = np.zeros(3)
         for expression, cells in self._parts:

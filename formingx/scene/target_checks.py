@@ -22,8 +22,8 @@ def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None
     Args:
         scene: the `Scene`.
         targets: the targets, with `name` and `value`, see `formingx.measures.targets`.
-        inactive: numbers in `Scene.items` of the items that a stage leaves out; None for a run from the unloaded state
-            with one control.
+        inactive: numbers in `Scene.items` of the items that a stage leaves out. None: the target is for a run from the
+            unloaded state with one control (`trace`).
 
     Raises:
         InputError: a target cannot be reached.
@@ -42,8 +42,8 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
     Args:
         scene: the `Scene`.
         target: the target, with `name` and `value`.
-        inactive: numbers in `Scene.items` of the items that a stage leaves out; None for a run from the unloaded state
-            with one control.
+        inactive: numbers in `Scene.items` of the items that a stage leaves out. None: the target is for a run from the
+            unloaded state with one control (`trace`).
 
     Returns:
         The reason as text; None if no reason is known.

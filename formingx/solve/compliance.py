@@ -100,16 +100,16 @@ class Columns:
 
 
 class CondensedColumns:
-    """Solutions as `Columns`, computed from a few entries of K^-1 for right-hand sides that are zero in most rows.
+    """Solutions of the bordered system for right-hand sides that are zero in most rows, as in `Columns`.
 
-    At first only the rows in which a right-hand side is not zero are computed. The changes of the control take one
-    solution with the transposed K. Each update takes one solution with K. Motions must depend on these rows and on the
-    control alone.
+    They are computed from a few entries of K^-1: those in the rows where a right-hand side is not zero. The motions of
+    contact points must depend on the unknowns of these rows and on the control alone. The changes of the control take
+    one solution with the transposed K. Each update of all unknowns takes one solution with K.
 
     Args:
         solver: solver with the factors of the tangent K.
         E: right-hand sides as columns, shape (n, m).
-        border: border of the system.
+        border: border of the system, the constraint of the arc length.
         inverse: entries of K^-1 in `rows` and in the columns of the same numbers, shape (k, k).
         rows: numbers of the rows in which a right-hand side is not zero, shape (k,).
 

@@ -164,10 +164,12 @@ class ContactFace(Protocol):
 
 
 class Viscosity(Protocol):
-    """Viscous forces eta V dx of a body, with the matrix V of a viscous stress and the viscosity eta."""
+    """Viscous forces eta V dx of a body: V is the matrix of a viscous stress, eta its viscosity, dx a motion."""
 
     def forces(self, change: Array, eta: float) -> Array:
-        """Return the viscous forces eta V dx for a change dx of the unknowns, locally owned entries, shape (n,)."""
+        """Return the viscous forces eta V dx for a change dx of the unknowns, locally owned entries, shape (n,).
+
+        V: matrix of the viscous stress. eta: its viscosity."""
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
         """Add eta V, with the viscosity eta, to a tangent matrix in place."""

@@ -268,7 +268,8 @@ class _Points:
         sides.
 
         Args:
-            ramps: for each face, function of motions that returns depth and path in the ramp (`Increment.in_ramp`).
+            ramps: for each face, function of motions that returns the depths of its points in the ramp and the vectors
+                through the ramp along the normal (`Increment.in_ramp`).
             y: motions before the correction, flat, length.
             new: motions after the correction, flat, length.
             entry_depth: depth in the ramp, over its width, at which a point stops when it enters the ramp, shape

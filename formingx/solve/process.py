@@ -314,7 +314,9 @@ class Execution:
         self._enter(base, rate, piece, 0.0)
 
     def _run_piece(self, then: float, through: _Targets, begun: bool) -> _Targets:
-        """Run a piece of the tables to its end at time `then`, and return the targets that are still open.
+        """Run a piece of a stage to its end at time `then`, and return the targets that are still open.
+
+        All tables of the stage are linear in time within a piece.
 
         through: pairs (target, output quantity) to meet in the piece. begun: True to continue the piece.
 

@@ -49,7 +49,7 @@ class RunTargets:
         return isinstance(self.quantity, Amplitude)
 
     def is_open(self) -> bool:
-        """Return True until the last target or the requested target is met."""
+        """Return True until the last target, or the other target that ends the run (`requested`), is met."""
         return all(any(target is end for target, _ in self.open) for end in self._ends)
 
     def gained(self, value: float | None = None) -> float:
@@ -149,8 +149,8 @@ class RunTargets:
     def turned_back(self) -> str:
         """Return a reason to give up if the path leads away from the last target, else "".
 
-        This is the case if more than half of the progress is lost. For a target of the control all progress must be
-        lost, since the control may decrease after a limit point.
+        This is the case if the progress (`gained`) falls below half of its largest value in the run. For a target of
+        the control it must fall below 0, since the control may decrease after a limit point.
         """
         if not self.is_open():
             return ""

@@ -43,8 +43,9 @@ class SnapThrough:
     displacement over the size of the body. Forces are relative to the support forces.
 
     Attributes:
-        lengths: step lengths below which the second failure of a step triggers a snap-through, one for each length. The
-            last length is also the length of the predictor where a kink reverses the path, or no shorter step is left.
+        lengths: arc lengths, decreasing. A step that fails twice below one of them is replaced by a snap-through, once
+            for each length. The last one is also the length of the predictor where a kink reverses the path, or where
+            no shorter step is left.
         ahead: change of the control in a snap-through, at first.
         furthest: largest change of the control in a snap-through.
         eta: first value of eta.
@@ -248,7 +249,8 @@ class _Motion:
             The state, of kind "jump"; None if none is near, or if it is a state to which the body must not return.
 
         Raises:
-            Failure: the viscous forces vanish, but a body without history variables has no equilibrium here.
+            Failure: the iteration fails where the viscous forces vanish, and the body has no history variables. (With
+                history variables, the present position counts as the equilibrium state.)
         """
         try:
             with self.curve.newton.in_a_hurry(True):        # after a failure, the viscous motion continues

@@ -95,7 +95,7 @@ class _Segment(NamedTuple):
                              force=self.force + ds * self.rate, extra=self.extra + ds * self.growth)
 
     def extended(self, m: int) -> _Segment:
-        """Return the segment extended to m points of known compliance; added points are open."""
+        """Return this segment of the path with forces and statuses for m points (`Points`); added points are open."""
         added = m - len(self.status)
         if not added:
             return self

@@ -73,6 +73,8 @@ class ToolFrame(NamedTuple):
 class Points:
     """Contact points of all ranks with known compliance, the motion of the body under unit forces at these points.
 
+    Each unit force contributes -1 to one component (r or z) of the residual F at one point.
+
     Args:
         faces: the active `FaceContact` objects.
         n: number of locally owned unknowns of the fields, the first entries of x.
@@ -81,7 +83,7 @@ class Points:
 
     Attributes:
         point_ids: (rank, face, point) of each of the m points.
-        columns: changes of x under unit forces of sign -1 at the points, locally owned rows, shape (size, 2 m).
+        columns: changes of x under these unit forces, locally owned rows, shape (size, 2 m).
         steps: changes of the control under these forces, shape (2 m,).
         motions: for each face, motion of its owned points under these forces, shape (points, 2, 2 m), length.
         friction: coefficient of friction, infinite for stick, shape (m,).

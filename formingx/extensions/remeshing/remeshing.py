@@ -349,7 +349,8 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
 def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
     """Return the unknowns in equilibrium at a control, from the transferred unknowns x on a new mesh.
 
-    Newton's method is tried first. If it fails, the unbalanced forces are faded out along a path.
+    Newton's method is tried first. If it fails, the unbalanced forces are applied as loads and reduced to zero along
+    `curve`, a path at constant control.
 
     Raises:
         ConvergenceError: no equilibrium was found.

@@ -198,7 +198,10 @@ class SecondVariation:
         return bool(forces < _FREE_MOTION_FORCE * single)
 
     def _constrain_rigid(self) -> None:
-        """Constrain one unknown of each free rigid motion in `matrix`: its largest, the earlier motions eliminated."""
+        """Constrain in `matrix` the unknown with the largest entry of each free rigid motion.
+
+        Before, Gaussian elimination removes the constrained unknowns of earlier motions from it.
+        """
         first, remaining = self.matrix.getOwnershipRange()[0], [mode.copy() for mode in self.rigid_motions]
         rows = []
         while remaining:

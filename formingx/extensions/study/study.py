@@ -302,7 +302,7 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
 
 
 def _measures(build: Any, measure: Any) -> dict[str, Measure]:
-    """Return the measures that a user gave as a dict.
+    """Check the arguments `build` and `measure` of a study, and return `measure` as a new dict.
 
     Raises:
         InputError: `build` is no function, or `measure` is no dict of functions and names of columns.

@@ -255,7 +255,7 @@ class Stresses:
         F and S are projected on piecewise linear fields, one for each layer. Collective.
 
         Returns:
-            The nonzero entries of F (`BLOCK`), then of S (`_S`), shape (nodes, layers, entries), ghost nodes included.
+            F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop, shape (nodes, layers, 9), with ghost nodes.
         """
         with self.problem.state_context(state):
             return self._projected()
