@@ -25,11 +25,11 @@ void gap_closures(long points, const double *x, const double *w, const double *o
                   double theta, const double *shift, long pieces, long lines, const double *table, double *times)
 {
     for (long i = 0; i < points; i++, x += 2, w += 2) {
-        double distance, before, now, way = 1.01 * at[intervals] * sqrt(w[0] * w[0] + w[1] * w[1]);
+        double distance, before, now, travel = 1.01 * at[intervals] * sqrt(w[0] * w[0] + w[1] * w[1]);
         if (!open[i]) continue;
         closest(x, pieces, lines, table, &distance);
         now = -theta - (distance - shift[i]);
-        if (!(way > now)) continue;                                     /* the path is too short */
+        if (!(travel > now)) continue;                                     /* the path is too short */
         for (long k = 0; k < intervals; k++) {
             double y[2] = {x[0] + at[k + 1] * w[0], x[1] + at[k + 1] * w[1]};
             before = fmax(now, 0.0);
@@ -81,8 +81,8 @@ def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.nda
         _compiled().gap_closures(len(start), address(start), address(velocity), address(free), 16, address(at),
                                  law.theta, address(shift), *law.profile.compiled_table, address(times))
         return times
-    ways = 1.01 * length * np.linalg.norm(velocity, axis=1)             # bound of the approach of each point
-    near = np.flatnonzero(free & (law.distance(start) + ways > -law.theta))
+    travels = 1.01 * length * np.linalg.norm(velocity, axis=1)             # bound of the approach of each point
+    near = np.flatnonzero(free & (law.distance(start) + travels > -law.theta))
     if len(near):
         gap = -law.theta - law.part(near).distance(start[near] + at[:, None, None] * velocity[near])    # shape (17, m)
         hit = np.flatnonzero((gap[1:] <= 0).any(0))

@@ -138,8 +138,7 @@ class Outline:
         return bool(np.isin(self.ends[around], self.ends[j]).any())
 
     def _gathered(self, values: np.ndarray) -> np.ndarray:
-        comm = self._forms.comm
-        return values if comm.size == 1 else gathered(comm, values)
+        return gathered(self._forms.comm, values)
 
 
 def edge_points(edges: np.ndarray, parts: int = _SEARCH_PIECES) -> np.ndarray:

@@ -130,7 +130,7 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
                 bend = min(wall / fillet.radius, np.arccos(1 - fillet.turn))
                 through = max(through, _through_fillet(bend, fillet.concave, fineness.promised))
                 if bend > _SHARPEST:
-                    inaccurate.append(_sharp(item, fillet, wall, preset.accuracy, fineness))
+                    inaccurate.append(_sharp_fillet(item, fillet, wall, preset.accuracy, fineness))
             shortest = min(shortest, column_length)
             size = np.minimum(size, column_length + GROWTH * _distance(s, fillet))
             if fillet.concave:
@@ -147,7 +147,7 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     return replace(preset.make(ends, _through_layers(preset, through, keep_through)), inaccurate=tuple(inaccurate))
 
 
-def _sharp(item: Any, fillet: FilletInSheet, wall: float, accuracy: str, fineness: Fineness) -> str:
+def _sharp_fillet(item: Any, fillet: FilletInSheet, wall: float, accuracy: str, fineness: Fineness) -> str:
     """Return the text of the finding about a fillet that is sharper than the wall on it is thick.
 
     Args:

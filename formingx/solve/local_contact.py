@@ -22,6 +22,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..ranks import gathered
 from .compliance import Border, columns
 from .equations import Array, ContactFace, Equations
 from .linear import DirectSolver
@@ -361,4 +362,4 @@ class _Points:
 
     def _gather(self, values: Array) -> Array:
         """Return locally owned values of all ranks, concatenated in the order of the ranks."""
-        return values if self._comm.size == 1 else np.concatenate(self._comm.allgather(values))
+        return gathered(self._comm, values)

@@ -23,6 +23,7 @@ import numpy as np
 
 from ...forms.schedule import StepData
 from ...measures.targets import Target
+from ...ranks import combined
 from ...results.path import Path
 from ...solve.newton import Failure, fixed
 from ...solve.pieces import control_step_data, end_time, next_knot, table_step_data
@@ -324,7 +325,7 @@ def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: b
             rate = float((near.normal * face.relative_motion(np.zeros(len(x.array_r)), 1.0)[local]).sum())
             face.add(values, problem.forms.length * forces)
             problem.fill(gradient, values)
-        return (distance, rate) if problem.comm.size == 1 else tuple(problem.comm.allreduce(np.array([distance, rate])))
+        return tuple(combined(problem.comm, np.array([distance, rate])))
     return gap
 
 
