@@ -27,7 +27,7 @@ def chill(mesh, conductivity, capacity, tolerance):
     run = fx.heat(mesh, SHEET, [fx.ContactWithTool("bottom", conductance=CONDUCTANCE, tool=tool),
                                 fx.Convection("top", h=H, air=AIR)], start=START, times=TIMES, unit="C",
                   tolerance=tolerance)
-    sheet = run.at([(0.0, 0.0), (0.0, THICKNESS / 2), (0.0, THICKNESS)])
+    sheet = run.at_points([(0.0, 0.0), (0.0, THICKNESS / 2), (0.0, THICKNESS)])
     return run, np.column_stack([sheet, [run.tool_profile("bottom", (0.0, 0.0), t)[1][0] for t in TIMES]])
 
 

@@ -33,8 +33,9 @@ def key_numbers(path, targets):
     return {
         "pressure_over_axisymmetric": {s: state.measures["pressure"] / exact.pressure
                                        for s, (state, exact) in states.items()},
-        "pole_thickness_over_axisymmetric": {s: path.wall(state).at(0, 0) / THICKNESS / exact.thickness_ratio[0]
-                                             for s, (state, exact) in states.items()},
+        "pole_thickness_over_axisymmetric": {
+            s: path.wall(state).thickness_at(0, 0) / THICKNESS / exact.thickness_ratio[0]
+            for s, (state, exact) in states.items()},
         "limit_pressure_over_axisymmetric": path.limit_points[0].measures["pressure"] / limit,
         "unknowns": path.problem.n_unknowns, "states": len(path), "iterations": path.counts.iterations,
         "failures": path.counts.failures, "seconds": path.counts.seconds}

@@ -27,7 +27,7 @@ def run(mesh, boundaries, times, tolerance):
 
 def along(heated, places):
     """Return the temperatures at shares of the thickness from the bottom, shape (times, places)."""
-    return heated.at([(0.0, THICKNESS * x) for x in places])
+    return heated.at_points([(0.0, THICKNESS * x) for x in places])
 
 
 def by_air(mesh, sides, tolerance):

@@ -74,7 +74,7 @@ def test_convection_and_absorption_are_those_of_the_series():
                                    fx.Absorption("top", flux=8000, coefficient=1500)],
                   start=25.0, times=times, unit="C")
     exact = reference.series(SLAB, 25.0, (60.0, 10.0), (220.0, 80.0), places, times, source)
-    found = run.at(np.column_stack([0 * places, places]))
+    found = run.at_points(np.column_stack([0 * places, places]))
     assert found == pytest.approx(exact, abs=1e-4 * (exact.max() - 25))
     s, weights = np.polynomial.legendre.leggauss(20)
     mean = reference.series(SLAB, 25.0, (60.0, 10.0), (220.0, 80.0), D * (s + 1) / 2, times, source) @ weights / 2
@@ -88,8 +88,8 @@ def test_a_temperature_step_at_a_face_causes_no_oscillation():
     run = fx.heat(strip(24), SHEET, [fx.FixedTemperature("bottom", temperature=125)], start=25.0, times=times, unit="C")
     x = np.linspace(0, D, 13)
     exact = 125 - 100 * erf(x / np.sqrt(4 * SHEET.diffusivity * np.array(times)[:, None]))
-    assert run.at(np.column_stack([0 * x, x])) == pytest.approx(exact, abs=1e-2)
-    history = run.at([(0.0, D / 12)], run.times[1:])[:, 0]
+    assert run.at_points(np.column_stack([0 * x, x])) == pytest.approx(exact, abs=1e-2)
+    history = run.at_points([(0.0, D / 12)], run.times[1:])[:, 0]
     assert np.all(np.diff(history[run.times[1:] > 0.05]) > 0)
     given = run.heat_through["FixedTemperature('bottom')"].sum()
     assert given == pytest.approx(run.heat_stored.sum(), rel=1e-10)
@@ -106,7 +106,7 @@ def test_a_tool_that_conducts():
     depths = np.array([0.0, 1e-3])
     sheet, inside = reference.sheet_on_tool(SLAB, reference.Slab(0.01, *TOOL.values()), 300, 150.0, 30.0, 10, 25.0,
                                              places, depths, times)
-    assert run.at(np.column_stack([0 * places, places])) == pytest.approx(sheet, abs=1e-4 * 125)
+    assert run.at_points(np.column_stack([0 * places, places])) == pytest.approx(sheet, abs=1e-4 * 125)
     for t, exact in zip(times, inside):
         y, T = run.tool_profile("bottom", (0.0, 0.0), t)
         assert T[0] == pytest.approx(exact[0], abs=1e-4 * 125)

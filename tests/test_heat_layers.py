@@ -30,7 +30,7 @@ def chilled(accuracy, thickness, conductance, metal, times, start=150.0, **optio
     exact, _ = reference.sheet_on_tool(reference.Slab(thickness, 0.17, 1050 * 1800.0),
                                        reference.Slab(0.02, *metal.values()),
                                        conductance, start, 30.0, 0.0, 25.0, x, [0.0], times)
-    return run, np.abs(run.at(np.column_stack([0 * x, x])) - exact).max(1)
+    return run, np.abs(run.at_points(np.column_stack([0 * x, x])) - exact).max(1)
 
 
 @pytest.mark.parametrize("accuracy, thickness, conductance, metal, start", [
@@ -66,7 +66,8 @@ def test_a_deformed_sheet_has_layers_too():
     x = np.linspace(0, 1, 9)
     exact = reference.series(reference.Slab(1e-3, 0.17, 1050 * 1800.0), 150.0, (500.0, 0.0), (20.0, 25.0),
                              1e-3 * x, [0.5, 1.0])
-    assert run.at(np.column_stack([0 * x, 4e-3 * (1 - x)])) == pytest.approx(exact, abs=running.WARNED_ERROR * 130)
+    found = run.at_points(np.column_stack([0 * x, 4e-3 * (1 - x)]))
+    assert found == pytest.approx(exact, abs=running.WARNED_ERROR * 130)
 
 
 def bodies():
@@ -114,7 +115,7 @@ from test_heat_layers import SHEET
 mesh = fx.mesh.disc(radius=0.05, thickness=1e-3, elements=(2, 1))
 laws = [fx.ContactWithTool("bottom", conductance=1e3, tool=20.0), fx.Convection("rim", h=50.0, air=30)]
 run = fx.heat(mesh, SHEET, laws, start=100.0, times=[0.1, 0.5], unit="C", tolerance=1.0)
-numbers = [*run.at([(0.0, 0.0), (0.03, 2e-4), (0.0499, 5e-4)]).ravel(), *run.errors_in_space]
+numbers = [*run.at_points([(0.0, 0.0), (0.03, 2e-4), (0.0499, 5e-4)]).ravel(), *run.errors_in_space]
 if mesh.comm.rank == 0:
     print(json.dumps(list(map(float, numbers))))
 """

@@ -23,9 +23,9 @@ def test_times_of_output_are_hit_and_between_steps_the_temperature_is_smooth(hea
     assert all(t in heated.times for t in (0.0, 5.0, 20.0)) and heated.times[-1] == 20.0
     assert heated.errors.max() <= 1e-3
     point, t = [(0.0, D / 2)], 11.3
-    exact = sides(times=[t, 20.0]).at(point)[0]
-    assert heated.at(point, t)[0] == pytest.approx(exact, abs=5e-3)
-    assert heated.at(point, [0.0])[0] == pytest.approx(25.0, abs=1e-12)
+    exact = sides(times=[t, 20.0]).at_points(point)[0]
+    assert heated.at_points(point, t)[0] == pytest.approx(exact, abs=5e-3)
+    assert heated.at_points(point, [0.0])[0] == pytest.approx(25.0, abs=1e-12)
 
 
 def test_hottest_coldest_and_when_the_sheet_is_in_a_window(heated):
@@ -46,17 +46,17 @@ def test_initial_temperatures_given_in_all_ways_agree(heated, tmp_path):
     heated.field_to_csv(tmp_path / "start.csv")
     (tmp_path / "line.csv").write_text("Z,T\n0,20\n0.003,80\n")
     places = [(0.0, D * x) for x in (0, 0.31, 1)]
-    begin = {name: sides(start=start, times=[1e-3]).at(places, [0.0])[0] for name, start in {
+    begin = {name: sides(start=start, times=[1e-3]).at_points(places, [0.0])[0] for name, start in {
         "run": heated, "function": heated.temperature(), "file": tmp_path / "start.csv",
         "line": tmp_path / "line.csv", "of Z": lambda R, Z: 20 + 60 * Z / D}.items()}
-    end = heated.at(places)[-1]
+    end = heated.at_points(places)[-1]
     assert begin["run"][[0, 2]] == pytest.approx(end[[0, 2]], abs=1e-9)
     assert np.array_equal(begin["run"], begin["function"])
     assert begin["run"] == pytest.approx(end, abs=2e-3)               # quadratic between nodes, which are others
     assert begin["file"] == pytest.approx(end, abs=0.2)               # linear between nodes
     assert begin["line"] == pytest.approx(begin["of Z"], abs=1e-9)
     table = fx.table({0.0: 100.0, 1.0: 50.0})
-    assert sides(start=table, times=[1e-3]).at(places, [0.0])[0] == pytest.approx(100.0, abs=1e-2)
+    assert sides(start=table, times=[1e-3]).at_points(places, [0.0])[0] == pytest.approx(100.0, abs=1e-2)
     cooled = fx.heat(strip(6), SHEET, [], start=heated, times=30.0, unit="C")      # no law: nothing gets out
     assert cooled.heat_stored.sum() == pytest.approx(0.0, abs=1e-9 * heated.heat_stored.sum())
     assert np.ptp(cooled.through()[1]) < np.ptp(heated.through()[1][-1]) / 3
@@ -85,7 +85,7 @@ def test_files_and_picture(heated, tmp_path):
     assert float(rows[-1].split(",")[3]) == heated.hottest().temperature
     axes = heated.plot_through()
     assert [line.get_label() for line in axes.lines] == ["t = 5", "t = 20"]
-    assert axes.lines[1].get_ydata()[0] == pytest.approx(heated.at([(0.0, 0.0)])[-1, 0])
+    assert axes.lines[1].get_ydata()[0] == pytest.approx(heated.at_points([(0.0, 0.0)])[-1, 0])
 
 
 RANKS = """
@@ -95,7 +95,7 @@ import formingx as fx
 from test_heat import SHEET, SKIN, TWO, everything
 mesh = fx.mesh.disc(radius=5e-3, thickness=TWO, elements=(3, 2))
 run = fx.heat(mesh, {"core": SHEET, "skin": SKIN}, everything(), start=25.0, times=[0.2, 0.5], unit="C", tolerance=0.05)
-numbers = [*run.at([(1e-3, 1e-3), (4e-3, 2e-3)]).ravel(), *run.hottest(), *run.mean_through(),
+numbers = [*run.at_points([(1e-3, 1e-3), (4e-3, 2e-3)]).ravel(), *run.hottest(), *run.mean_through(),
            *(h.sum() for h in run.heat_through.values()), *run.tool_profile("bottom", (2e-3, 0))[1], len(run.times)]
 try:
     fx.heat(mesh, {"core": SHEET, "skin": SKIN}, [], start=fx.table({0: 20, 3e-3: 50}), times=1.0, unit="C")
@@ -147,7 +147,7 @@ def test_runs_that_are_refused(changes, words, small):
 
 
 def test_wrong_requests_to_a_heat_result_are_refused(heated, tmp_path):
-    for ask, words in ((lambda: heated.at([(0.0, 2 * D)]), "not in the mesh"),
+    for ask, words in ((lambda: heated.at_points([(0.0, 2 * D)]), "not in the mesh"),
                        (lambda: heated.temperature(21.0), "must be from 0 to 20"),
                        (lambda: heated.time_to_reach(3.0, 2.0), "must be below high"),
                        (lambda: heated.tool_profile("top", (0, 0)), "conducting tool on boundary 'top' is not known"),

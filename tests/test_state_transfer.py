@@ -89,10 +89,10 @@ def test_temperatures_of_body_and_tools_are_transferred():
     body, found = fine.histories[-1]._body, fine.history_variables[-1]
     assert found.temperature == pytest.approx(quadratic_of(body.points), rel=1e-9)
     assert np.array_equal(fine.temperature.T.x.array[: len(found.temperature)], found.temperature)
-    lines, kept = found.lines[0], variables[-1].lines[0]
+    excess, kept = found.tool_excess[0], variables[-1].tool_excess[0]
     over = 0.1 * np.ptp(kept)                               # fits go beyond a jump, where the touch ends, by a little
-    assert kept.min() - over < lines.min() < lines.max() < kept.max() + over and len(lines) > len(kept)
-    assert lines.max() == pytest.approx(kept.max(), rel=0.1)
+    assert kept.min() - over < excess.min() < excess.max() < kept.max() + over and len(excess) > len(kept)
+    assert excess.max() == pytest.approx(kept.max(), rel=0.1)
 
 
 def quadratic_of(X):

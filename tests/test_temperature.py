@@ -154,7 +154,7 @@ def test_a_sheet_cools_while_it_waits():
     points = np.array([[0.0, 0.0], [0.01, 1e-3]])
     c10 = path.problem.forms.terms[0].constants["c10"].ufl_operands[0]        # times how it goes on in a step
     with path.problem.state_context(path.last):
-        assert path.problem.temperature.at_points(points) == pytest.approx(alone.at(points)[-1], abs=0.05)
+        assert path.problem.temperature.at_points(points) == pytest.approx(alone.at_points(points)[-1], abs=0.05)
         stiffer = c10.x.array.max()
     with path.problem.state_context(path.states[0]):
         assert np.all(path.problem.temperature.T.x.array == 150.0)

@@ -246,7 +246,7 @@ class Approach:
         now = face.tractions(new, control).normal
         if self._pressure_difference(now, law.pressure_ahead(face.history)) <= LIMITS.pressure_difference:
             return False
-        face.set_closures(law.at_pressure(face.history, now))
+        face.set_closures(law.closure_at_pressure(face.history, now))
         return True
 
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:

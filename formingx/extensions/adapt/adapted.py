@@ -26,8 +26,8 @@ def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | Non
     """Return a new mesh of the body of a run, with columns of elements as fine as its states need. Collective.
 
     The length of a new column is the smallest that a state demands. It is at most 1.25 times its neighbour's and at
-    least an eighth of the column in the run, because coarse columns give unreliable sizes. To refine further, adapt a
-    second time from a run on the new mesh. The elements through the sheet, layers and interfaces stay.
+    least an eighth of the column in the run, because lengths estimated on coarse columns are inaccurate. To refine
+    further, adapt a second time from a run on the new mesh. The elements through the sheet, layers and interfaces stay.
 
     The mesh must come from `disc`, `sphere`, `parison` or `from_lines`. In a `sheet` in three dimensions triangles
     become smaller, at most to a quarter, and never larger.
@@ -36,9 +36,10 @@ def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | Non
         path: a run on a coarse mesh (a pilot run); it may be incomplete.
         max_rotation: largest rotation of the sheet along a column, radians. On a fillet of a tool it is the length of
             the column over the fillet radius. In three dimensions it is the rotation between triangles. None: ignored.
-        error: largest estimated relative error of the stress over the body (`StressError.relative`), shared by the
-            columns as a second-order error. More columns do not help if too few elements lie through the sheet. In
-            three dimensions it is the relative change of the wall between triangles. None: ignored.
+        error: largest estimated relative error of the stress over the body (`StressError.relative`). The error of a
+            column is assumed to decrease with the square of its length. More columns do not help if too few elements
+            lie through the sheet. In three dimensions `error` is the relative change of the wall between triangles.
+            None: ignored.
 
     Returns:
         The new mesh.
@@ -119,11 +120,13 @@ def checked_columns(mesh: Mesh) -> Columns:
 
 
 def _new_ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
-    """Return the ends of new columns along the sheet, as coordinates of `Columns`.
+    """Return the coordinates along the sheet at which new columns end, in the unit of `columns.ends`, shape (k + 1,).
+
+    A column consists of the elements through the sheet between two successive cross-sections; k is the new number.
 
     Args:
         columns: the n present columns.
-        factors: required over present length of each column, shape (n,); inf: as long as the longest column.
+        factors: factors by which the columns should become longer, shape (n,); inf: as long as the longest column.
 
     Raises:
         InputError: too many columns would be needed.

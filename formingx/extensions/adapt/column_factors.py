@@ -26,18 +26,19 @@ _STRESS_ORDER = 2
 
 @method_of(Path)
 def column_factors(path: Any, max_rotation: float | None, error: float | None) -> np.ndarray:
-    """Return the required over the present length of the n columns of a mesh, the smallest over all states.
+    """Return the factors by which the n columns of a mesh should become longer (below 1: shorter).
 
-    A column consists of the elements through the sheet between two successive cross-sections.
+    A column consists of the elements through the sheet between two successive cross-sections. A factor is the length
+    that the column should have over its present length. The state of the run that demands the smallest one counts.
 
     Args:
         path: the run.
-        max_rotation: largest rotation of the sheet along a column, radians, or length of a column over the radius of a
-            fillet that it touches; None: ignored.
+        max_rotation: largest angle, radians, by which the sheet turns from one end of a column to the other. The
+            length of a column on a fillet of a tool is at most `max_rotation` times the fillet radius. None: ignored.
         error: largest estimated relative error of the stress over the body; None: ignored.
 
     Returns:
-        Factors, shape (n,); inf where no state demands a size.
+        Factors, shape (n,); inf where no state demands a length.
 
     Raises:
         InputError: a sheet in three dimensions, a mesh without columns, or a limit that is not above 0.
@@ -62,7 +63,7 @@ def _nearest_column(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
 
     Args:
         points: reference positions, shape (m, 2), length.
-        middles: positions of nodes in the middle of the n columns, shape (rows, n, 2), length.
+        middles: reference positions of nodes halfway along the n columns, shape (rows of nodes, n, 2), length.
     """
     n = middles.shape[1]
     from scipy.spatial import cKDTree
@@ -70,14 +71,15 @@ def _nearest_column(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
 
 
 def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) -> np.ndarray:
-    """Return the required over the present length of the n columns for a largest rotation, shape (n,).
+    """Return the factors by which the n columns of elements should become longer for a largest angle, shape (n,).
 
-    The rotation of a column is that along the sheet, or on a fillet of a tool its length over the fillet radius.
+    It is the angle by which the sheet turns from one end of a column to the other. On a fillet of a tool it is instead
+    the length of the column over the fillet radius.
 
     Args:
         path: the run.
-        max_rotation: largest rotation, radians.
-        middles: positions of nodes in the middle of the columns, shape (rows, n, 2), length.
+        max_rotation: largest angle, radians.
+        middles: reference positions of nodes halfway along the columns, shape (rows of nodes, n, 2), length.
     """
     found = np.full(middles.shape[1], np.inf)
     problem = path.problem
@@ -113,13 +115,14 @@ def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) ->
 
 
 def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Return the rotation of the sheet along each of the n columns, radians, shape (n,).
+    """Return the angle by which the sheet turns along each of n columns of elements, radians, shape (n,).
 
     Half of a kink between two columns counts in each.
 
     Args:
         edges: deformed edges of the outline: first end, second end, midpoint, shape (m, 3, 2), length.
-        sides: for each of the two faces, the edges of the columns in order, and the mask of the reversed ones.
+        sides: for each of the two faces, the row numbers in `edges` of its n edges, in the order of the columns, shape
+            (n,). A mask, shape (n,), is True for edges whose first end lies at the end of their column.
     """
     tangent = np.zeros(edges.shape[-1])                      # at both ends of each column, averaged over both faces
     for numbers, reversed_edges in sides:
@@ -134,17 +137,18 @@ def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) ->
 
 
 def _factors_by_stress_error(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
-    r"""Return the required over the present length of the n columns for a given stress error, shape (n,).
+    r"""Return the factors by which the n columns should become longer for a given error of the stress, shape (n,).
 
     .. math:: h \propto C^{-2/(2p + 1)}, \qquad \int (C h^p)^2 \, ds = \varepsilon^2 \|\sigma\|^2
 
-    C h^p is the error of the stress in a column of length h, with the order p = 2, s the length along the sheet, and
-    epsilon the relative error of the stress sigma. The smallest length of all examined states counts.
+    C h^p is the error of the stress sigma in a column of elements of length h. The order is p = 2, and the run gives
+    the constant C of each column. s is the length along the sheet, and epsilon the relative error. The smallest factor
+    over the examined states is returned; a factor is h over the present length.
 
     Args:
         path: the run.
-        error: largest estimated relative error of the stress over the body.
-        middles: positions of nodes in the middle of the columns, shape (rows, n, 2), length.
+        error: largest estimated relative error epsilon of the stress over the body.
+        middles: reference positions of nodes halfway along the columns, shape (rows of nodes, n, 2), length.
     """
     n = middles.shape[1]
     length = np.linalg.norm(np.diff(path.problem.scene.mesh.columns.place(

@@ -56,9 +56,9 @@ class Comparison:
         limit_points: limit points of (ours, theirs), each a list of {column: value}. A run has located the points of a
             `Path`. Others lie on the parabola through the three points at which the control turns. The control is
             pressure or travel, else the first column.
-        resolution: largest change of (our, their) curve, over the ranges of the columns, if every second point is left
-            out. A difference below a tenth of it may come from interpolation. A `Path` also knows its tangents, so
-            its curve is more accurate.
+        resolution: resolution of (our, their) curve: the largest distance of every second point from the curve through
+            the other points. Each column is divided by its range before. A difference below a tenth of the resolution
+            may come from interpolation. A `Path` also knows its tangents, so its curve is more accurate.
         along: independent column at whose values the others are compared; "" for pairs by arc length.
     """
 
@@ -299,9 +299,10 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
     """Return the difference of one column between two curves, with its maximum and root mean square.
 
     Args:
-        values: differences at the k compared points, shape (k,).
+        values: differences at the k compared points of their curve, shape (k,).
         size: range of the column in our curve.
-        partners: partners of these points on our curve, each column divided by its range, shape (k, c).
+        partners: points of our curve that these are compared with, in the c columns, each divided by its range, shape
+            (k, c). The arc length along them weights the mean.
     """
     s = arc_length(partners)
     weights = np.ones(len(s))

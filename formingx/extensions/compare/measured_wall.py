@@ -110,7 +110,8 @@ class MeasuredWall:
             Thickness at the m points, shape (m,), length.
 
         Raises:
-            InputError: a length is more than a tenth beyond the end of the computed part.
+            InputError: a measured `length` or `reference_length` lies outside the computed part by more than a tenth of
+                its length.
         """
         profile = path.profile()
         return np.interp(self._locate(profile)[0], np.arange(len(profile.middle)), profile.wall_thickness)
@@ -125,7 +126,8 @@ class MeasuredWall:
             Computed and measured walls at the m points.
 
         Raises:
-            InputError: a length is more than a tenth beyond the end of the computed part; a sheet in three dimensions.
+            InputError: a measured `length` or `reference_length` lies outside the computed part by more than a tenth of
+                its length; or a sheet in three dimensions.
         """
         profile = path.profile()
         numbers_of_points, distance = self._locate(profile)
@@ -148,7 +150,8 @@ class MeasuredWall:
             of the measured points from the line, or beyond its end, shape (m,), length.
 
         Raises:
-            InputError: a length is more than a tenth beyond the end of the computed part.
+            InputError: a measured `length` or `reference_length` lies outside the computed part by more than a tenth of
+                its length.
         """
         numbers = np.arange(len(profile.middle), dtype=float)
         if self.points is None:
@@ -240,7 +243,10 @@ class WallComparison:
     def to_csv(self, file: Any) -> FilePath:
         """Write a CSV file with a row for each measured point (rank 0 writes).
 
-        The columns are length, reference_length, measured, computed, deviation_percent and distance.
+        The columns length and reference_length are arc lengths of the points from the axis, along the deformed and the
+        undeformed middle line. The columns measured and computed are thicknesses. The column deviation_percent is
+        computed minus measured, in percent of the measured thickness. The column distance is the distance of the
+        measured point from the computed middle line, or its arc length beyond the end of the line.
 
         Args:
             file: path of the CSV file.

@@ -20,8 +20,8 @@ class SearchSettings:
         volume_margin: relative reduction of the first run's volume as a target, so that round-off does not exceed it.
         tolerance: relative deviation of the volume or the minimum wall above which the result reports it.
         wall_tolerance: largest relative deviation of the wall up to which the wanted wall counts as reached.
-        limiting_share: a bound or the prescribed volume is named as the reason for a deviation if the deviation would
-            be below this share without it.
+        limiting_share: a bound or the prescribed volume is named as the reason of a deviation of the wall if it makes
+            most of it. Removed from the search, it would leave a deviation below this share of the present one.
         damping: Levenberg damping over the largest singular value of the sensitivities.
         damping_measured: the same for the fit to a measured wall, which contains scatter.
         min_improvement: the search ends after two runs that each lower the cost by less than this part, or before a

@@ -44,7 +44,7 @@ def trace_perturbed(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> 
         perturbed: the perturbed runs; their states are updated in place.
 
     Raises:
-        Failure: the base run has no derivative; the text of the failure is the reason.
+        Failure: the base run has no derivatives by the parameters; the text of the failure is the reason.
     """
     _PerturbedPaths(path, end, perturbed).run()
 
@@ -83,7 +83,7 @@ class _PerturbedPaths:
         """Solve for the perturbed runs at the states of the base run, from its first state to its last.
 
         Raises:
-            Failure: the base run has no derivative; the text of the failure is the reason.
+            Failure: the base run has no derivatives by the parameters; the text of the failure is the reason.
         """
         states = self.path.states
         history = self.problem.has_history
@@ -179,7 +179,10 @@ class _PerturbedPaths:
             self._velocity = [face.relative_motion(b, 1.0) for face in self.problem.contacts]
 
     def _keep_open(self, state: State) -> None:
-        """Keep the contact points of the perturbed runs open that are open in the base run at a state."""
+        """Set the contact points that are open in the base run at a state to stay open in all perturbed runs.
+
+        Points whose gap closes at the end of the step stay open too, in the base run and in the perturbed runs.
+        """
         n = self.problem.n_owned
         for face, closing, *others in zip(self.problem.contacts, self._closing,
                                           *(run.problem.contacts for run in self.runs)):
@@ -304,7 +307,10 @@ class _PerturbedPaths:
 
 
 def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: bool) -> Any:
-    """Return the signed distance of a contact point from its tool as a constraint, a function (x, control, gradient).
+    """Return a constraint that closes the gap of a contact point: its signed distance from the tool, 0 when closed.
+
+    The constraint is a function of the unknowns x, the control and a vector that it fills with the gradient by x. It
+    returns the distance, length, and the derivative of the distance by the control.
 
     Args:
         problem: problem of the run.
@@ -332,8 +338,11 @@ def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: b
 def _fixed_properties(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
     """Return the properties of a stage, given as its `Plan`, that no parameter may change.
 
+    Items are the loads, supports and contacts of the scene, counted from 0.
+
     Returns:
-        Numbers of the controlled loads; (load, length) of each table of an amplitude; numbers of the inactive items.
+        Numbers of the controlled items; for each table of an amplitude, the number of its item and the number of its
+        rows; numbers of the inactive items.
     """
     return p.numbers, [(i, len(table)) for i, table in p.tables], p.inactive
 

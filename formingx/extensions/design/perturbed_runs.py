@@ -52,7 +52,10 @@ _TOLERANCES = PerturbedTolerances()
 
 
 class PerturbedRunFailure(Failure):
-    """Failure to find a perturbed state near the base state: the change is too large for the regularised contact."""
+    """Failure to find a perturbed state near the base state.
+
+    The change of the parameter then moves contact points by more than the small distance over which contact begins.
+    """
 
 
 class PerturbedRun:

@@ -161,7 +161,7 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
         colour: colour of the line.
         label: label of the line.
         spread: standard deviation of the wall at the k nodes, shape (k,), length, or None for no band.
-        deviations: standard deviations of the parameters, for the label of the band.
+        deviations: {parameter: standard deviation}, a `Fit`, or a list of such, for the label of the band.
         units: units of the labels.
     """
     s = run.profile.reference_length
@@ -176,7 +176,14 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
 
 
 def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
-    """Return an HTML figure of the walls of a search: of the first and the best run, predicted and wanted."""
+    """Return an HTML figure of the walls of a search: of the first and the best run, predicted and wanted.
+
+    Args:
+        result: the `DesignResult` of the search.
+        spread: standard deviation of the best wall at the k nodes, shape (k,), length; None: no band.
+        deviations: {parameter: standard deviation}, a `Fit`, or a list of such, for the label of the band.
+        units: units of the labels.
+    """
     drawing, axes = figure(1, width=9, height=4)
     s = result.best.profile.reference_length
     axes.plot(s, result.before.wall, color="0.6", label="before")
@@ -190,7 +197,12 @@ def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
 
 
 def _profiles(before: Any, best: Any) -> str:
-    """Return an HTML figure of the parameters that are profiles, in the first and the best run; "" without profiles."""
+    """Return an HTML figure of the parameters that are profiles, that is, splines along the body; "" without any.
+
+    Args:
+        before: first run of the search, a `DesignRun`.
+        best: best run of the search, a `DesignRun`.
+    """
     found = best.parameters.profiles
     if not found:
         return ""
@@ -223,7 +235,7 @@ def _uncertainties(run: Any, deviations: Any, units: Units) -> list[str]:
 
     Args:
         run: the `DesignRun`.
-        deviations: standard deviations of the parameters, or None for an empty list.
+        deviations: {parameter: standard deviation}, a `Fit`, or a list of such; None: an empty list is returned.
         units: units of the labels.
     """
     if not deviations:

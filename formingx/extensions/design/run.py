@@ -163,7 +163,7 @@ class DesignRun:
         raise InputError(f"Design: this run has no derivative: {reason}")
 
     def _perturbed_run(self, k: int, step: float) -> PerturbedRun:
-        """Return a perturbed run, still to be solved, whose parameter with number k is changed by a step."""
+        """Return a perturbed run, still to be solved: parameter number k has its value plus `step`, in its unit."""
         moved, name = self.vector.copy(), self.parameters.names[k]
         moved[k] += step
         try:
@@ -199,7 +199,8 @@ class DesignRun:
             measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
 
         Returns:
-            Values and derivatives; of the wall over the reference length.
+            Table of the m values and their derivatives. The rows of a wall are ordered by `coordinates`: the reference
+            length, which is the distance from the axis along the undeformed middle line.
 
         Raises:
             InputError: the run has no derivative, or the quantity depends on earlier states.

@@ -30,9 +30,9 @@ class TimedTest(NamedTuple):
 
     Args:
         mode: "uniaxial", "pure_shear" or "equibiaxial".
-        times: times of the points, shape (n,), not decreasing. The first stretch is applied suddenly at the first time;
-            two stretches at the same time are a jump. A constant stretch with a positive first time is applied at time
-            0.
+        times: times of the points, shape (n,), not decreasing. The first stretch is applied suddenly, at the first
+            time. If all stretches are equal and the first time is positive, it is applied at time 0 instead. Two
+            stretches at the same time are a jump.
         stretches: stretches at these times, shape (n,).
         stress: nominal stresses at these times, shape (n,); nan where the stress was not measured.
         between: quantity that changes at a constant rate between two points, "stretch" or "strain" (logarithmic).

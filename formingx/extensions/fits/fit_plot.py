@@ -45,7 +45,13 @@ def draw_fit(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) 
 
 
 def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
-    """Draw stresses of elastic tests over the stretch on matplotlib axes `panel`, with curves of the material."""
+    """Draw stresses of elastic tests over the stretch, with curves of the material.
+
+    Args:
+        material: the fitted material.
+        data: {test: (stretches, nominal stresses)}, shape (n,) each; of "biaxial" two stretches and two stresses.
+        panel: matplotlib axes.
+    """
     for mode, (l, *others, P) in data.items():
         if others:                                          # two stretches, two stresses
             _draw_biaxial(material, (l, *others, P), panel)

@@ -122,7 +122,10 @@ class MeasuredRange:
 
     @cached_property
     def _corners(self) -> np.ndarray:
-        """Convex hull of the tested strains and zero strain, counter-clockwise, shape (k, 2)."""
+        """Corners of the convex hull of the tested strains and zero strain, counter-clockwise, shape (k, 2).
+
+        The columns are the largest and the middle principal logarithmic strain.
+        """
         return _hull(np.vstack([np.zeros(2), self.strains]))
 
     def __repr__(self) -> str:

@@ -52,7 +52,10 @@ def error_of_layers(layers: float, biot: float) -> float:
 
 
 def layers_needed(biot: float) -> int:
-    """Return the number of equal layers of elements for which `error_of_layers` is at most 1 %.
+    """Return the number of equal layers of elements that resolve a sudden cooling of one face of a sheet.
+
+    The largest error of the temperature is then at most 1 % of the difference between the highest and the lowest
+    temperature (`error_of_layers`).
 
     Args:
         biot: Biot number: conductance of the chilled face times thickness of the sheet over conductivity.

@@ -11,7 +11,7 @@ The entries of M therefore add up to 1, and R is in degrees per time.
 """
 
 from collections.abc import Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import ufl
@@ -31,35 +31,20 @@ from ...solve.linear import DirectSolver
 from ...values.table import Table
 from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .contact import ContactWithTool, HeatContact
+from .implicit_stage import Stage
 from .vectors import HeatVectors
 
 _MAX_ITERATIONS = 20
 """Largest number of Newton iterations in an implicit stage."""
 
 
-class Stage(NamedTuple):
-    """Result of an implicit stage of a time step, for a body and the tools in contact with it.
-
-    Attributes:
-        changes: changes of temperature since the start of the step. The first array is for the body, locally owned
-            entries, shape (n,). An array for each tool in contact follows, along its depth, shape (nodes, m).
-        rates: rates of heat M dT/dt at the end of the stage, shapes as of `changes`. For the body they are divided by
-            its heat capacity, degrees per time; for the tools they are per contact area.
-        heats: heat per time into the whole body through each boundary and from each source, in the order of
-            `Conduction.names`, without faces of prescribed temperature.
-    """
-
-    changes: list[np.ndarray]
-    rates: list[np.ndarray]
-    heats: np.ndarray
-
-
 class Conduction(HeatVectors):
     """Finite element equations M dT/dt = R(T) of heat conduction in a body and in the tools that touch it.
 
     A temperature state is a list. Its first array has the temperatures of the body at the n locally owned nodes. One
-    array follows per tool contact: temperatures above the back of the tool, shape (contact nodes, m), along the depth
-    of the tool. Entries of M and R of the body are divided by `capacity`: M sums to 1, and R is in degrees per time.
+    array follows per tool contact, shape (contact nodes, m). It has the excess temperatures of the tool over its back,
+    at m nodes along the depth below each contact node, the face first. Entries of M and R of the body are divided by
+    `capacity`: M sums to 1, and R is in degrees per time.
 
     Args:
         mesh: the `Mesh`.
@@ -116,10 +101,11 @@ class Conduction(HeatVectors):
         self.update()
 
     def start(self) -> list[np.ndarray]:
-        """Return the initial temperatures of body and tools, with the values of `FixedTemperature` at its faces.
+        """Return the initial temperatures of body and tools; faces with `FixedTemperature` have their prescribed value.
 
         Returns:
-            [temperatures of the body, from `T`, shape (n,); temperatures in each tool, shape (contact nodes, m)].
+            List of arrays. The first has the temperatures of the body, from `T`, shape (n,). One follows for each tool
+            in contact: its excess temperatures over its back, at m nodes along the depth, shape (contact nodes, m).
         """
         return [self.with_fixed_values(self.T.x.array[: self._n]), *(touch.start() for touch in self.tool_contacts)]
 
@@ -148,17 +134,18 @@ class Conduction(HeatVectors):
         """Return the rates of heat of body and tools at given temperatures.
 
         Args:
-            state: [temperatures of the body, shape (n,); temperatures in each tool in contact, shape (contact nodes,
-                m)].
+            state: temperatures of the body, shape (n,). Then for each tool in contact its excess temperatures over its
+                back, at m nodes along the depth, shape (contact nodes, m).
 
         Returns:
-            Rates of heat M dT/dt with the capacity matrix M, as `Stage.rates`; heat per time into the body, as
-            `Stage.heats`.
+            Rates of heat M dT/dt with the capacity matrix M, a list of arrays with the shapes of `state`. For the body
+            they are divided by its heat capacity, degrees per time; for the tools they are per contact area. Then the
+            heat per time into the whole body through each boundary and from each source, as `Stage.heats`.
         """
         R = self._body_rate(state[0])
         found, through = [R], []
-        for touch, lines in zip(self.tool_contacts, state[1:], strict=True):
-            q, rate = touch.rates(lines, state[0][touch.dofs])
+        for touch, excess in zip(self.tool_contacts, state[1:], strict=True):
+            q, rate = touch.rates(excess, state[0][touch.dofs])
             R[touch.dofs] += touch.area * q
             through.append(touch.area @ q)
             found.append(rate)
@@ -172,10 +159,11 @@ class Conduction(HeatVectors):
         M is the capacity matrix, R the rate of heat, Delta the change of the temperatures y.
 
         Args:
-            state: temperatures y of the body, then in each tool in contact, at the start of the step.
+            state: temperatures y of the body at the start of the step, shape (n,). Then for each tool in contact its
+                excess temperatures over its back, at m nodes along the depth, shape (contact nodes, m).
             known: heats k from earlier stages: of the body over its heat capacity, degrees, shape (n,); of each tool in
                 contact per contact area, shape (contact nodes, m).
-            c: factor c of the rates, time.
+            c: time c by which the stage multiplies rates of heat.
             guess: initial guess of the change of the temperatures of the body, locally owned entries, shape (n,).
 
         Returns:
@@ -185,7 +173,7 @@ class Conduction(HeatVectors):
             ConvergenceError: Newton's method found no solution.
         """
         T = state[0]
-        responses = [touch.response(lines, k, c) for touch, lines, k in zip(self.tool_contacts, state[1:], known[1:])]
+        responses = [touch.response(excess, k, c) for touch, excess, k in zip(self.tool_contacts, state[1:], known[1:])]
         change = np.where(self._fixed_mask, 0.0, guess)
         for iteration in range(_MAX_ITERATIONS):
             R = self._body_rate(T + change)
@@ -212,9 +200,9 @@ class Conduction(HeatVectors):
         matrix of the last `stage` is reused if it had the same c; otherwise it is assembled at the last temperature.
 
         Args:
-            known: heats k: of the body over its heat capacity, degrees, shape (n,); of each tool in contact per contact
-                area, shape (contact nodes, m).
-            c: factor c of the rates, time.
+            known: heats k of the body over its heat capacity, degrees, shape (n,). Then of each tool in contact per
+                contact area, at m nodes along the depth, shape (contact nodes, m).
+            c: time c by which the step multiplies rates of heat.
 
         Returns:
             Largest absolute change of body and tools over all ranks, degrees.
@@ -245,9 +233,12 @@ class Conduction(HeatVectors):
     def through_fixed_faces(self, missing: np.ndarray) -> np.ndarray:
         """Return the heat that enters the body in a step through each face of prescribed temperature.
 
+        A node on such a face stores more heat in the step than conduction, laws of other faces and sources supply. The
+        missing heat enters through the face.
+
         Args:
-            missing: heat that each node stores in the step minus the heat supplied by conduction, laws and sources,
-                over `capacity`, degrees, locally owned entries, shape (n,).
+            missing: missing heat of each node, divided by the heat capacity of the body (`capacity`), degrees, locally
+                owned entries, shape (n,).
 
         Returns:
             Heat through each face, shape (faces,), summed over ranks. These faces are the last entries of `names`.
@@ -266,9 +257,10 @@ class Conduction(HeatVectors):
         Args:
             T: temperatures of the body at the start of the step, shape (n,).
             change: change of these temperatures in the stage, shape (n,).
-            known: heats of body and tools from earlier stages, as in `stage`.
-            c: factor of the rates, time.
-            responses: response of each tool in contact.
+            known: heats of the body from earlier stages, over its heat capacity, degrees, shape (n,). Then of each tool
+                in contact per contact area, at m nodes along the depth, shape (contact nodes, m).
+            c: time by which the stage multiplies rates of heat.
+            responses: `ToolResponse` of each tool in contact.
         """
         R = self._body_rate(T + change)
         changes, rates, through = [change], [R], []
@@ -281,9 +273,12 @@ class Conduction(HeatVectors):
         return Stage(changes, rates, self._heats(through))
 
     def _heats(self, tool_heats: list[float]) -> np.ndarray:
-        """Return the heat per time into the whole body by each law, source and tool contact, at the temperature `T`.
+        """Return the heat per time into the whole body at the temperature `T`, summed over ranks, shape (k,).
 
-        tool_heats: heat per time through each tool contact on this rank, over `capacity`.
+        The k entries belong to the laws of faces, then the heat sources, then the contacts with tools.
+
+        tool_heats: heat per time into the body through each contact with a tool on this rank, divided by the heat
+        capacity of the body (`capacity`), degrees per time.
         """
         local = [fem.assemble_scalar(form) for form in self._scalars] + tool_heats
         return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
@@ -318,7 +313,10 @@ class Conduction(HeatVectors):
         return [(m, self._dx if everywhere else self._dx(tuple(tags))) for m, tags in groups.values()]
 
     def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
-        """Return the UFL form, with test function v, of the heat of the body at temperature T, over `capacity`."""
+        """Return the heat of the body at temperature T, divided by its heat capacity, as a form with test function v.
+
+        materials: {layer: `ThermalProperties`}. T, v: UFL scalars. Without `capacity` (`_scale` = 1) it is the heat.
+        """
         return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
                    for m, dx in self._layer_measures(materials))
 
@@ -420,8 +418,8 @@ class Conduction(HeatVectors):
         """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of rates of heat at the last `T`.
 
         Args:
-            c: factor of the rates, time.
-            responses: response of each tool in contact, which adds to the diagonal.
+            c: time by which the stage multiplies rates of heat.
+            responses: `ToolResponse` of each tool in contact, whose conductance adds to the diagonal.
             afresh: True to factorise in any case; False to keep the last factors if they have the same c.
         """
         if self._factored_for == c and not afresh:

@@ -4,16 +4,17 @@ At each node of the face the flux into the body is
 
 .. math:: q = h (T_{tool} - T)
 
-with the conductance h. In a conducting tool heat flows in one dimension along the depth y below each node (its *line*).
-The temperature w satisfies
+with the conductance h. In a conducting tool heat flows in one dimension, along the depth y below each contact node. The
+excess temperature w of the tool is its temperature minus the prescribed temperature of its back. It satisfies
 
 .. math:: C \frac{\partial w}{\partial t} = k \frac{\partial^2 w}{\partial y^2}, \qquad
-          -k \frac{\partial w}{\partial y} = -q \text{ at the face}, \qquad w = w_{back} \text{ at the back}
+          -k \frac{\partial w}{\partial y} = -q \text{ at the face}, \qquad w = 0 \text{ at the back}
 
-In an implicit stage M w' = known + c rate the line responds linearly to q. Its face has w = w_free - z q, with one z
-for all lines. The line is therefore condensed:
+with the heat capacity C per volume and the conductivity k. In an implicit stage of a time step the temperatures below a
+node respond linearly to q. The face of the tool has the temperature T_0 - z q, with the temperature T_0 that it would
+have without flux, and one compliance z for all nodes. So only the temperatures T of the body remain unknown:
 
-.. math:: q = g (w_{free} - T), \qquad g = \frac{h}{1 + z h}
+.. math:: q = g (T_0 - T), \qquad g = \frac{h}{1 + z h}
 """
 
 from functools import lru_cache
@@ -70,7 +71,7 @@ class ConductingTool:
         """Return capacity and conductivity matrices along the depth, per contact area, without the node at the back.
 
         Returns:
-            Capacity and conductivity matrix, shape (2 elements, 2 elements) each, for temperatures above `back`.
+            Capacity and conductivity matrix, shape (2 elements, 2 elements) each, for temperatures minus `back`.
         """
         y = self.depths
         M, K = np.zeros((2, len(y), len(y)))
@@ -129,14 +130,15 @@ class ContactWithTool:
 class ToolResponse(NamedTuple):
     """Linear response of a tool to the flux q into the body, in an implicit stage of a time step.
 
-    The tool has m nodes along its depth (a line) below each of n contact nodes. The flux is q = `conductance`
-    (`face_temperature` - T) with the temperature T of the body. The lines change by `change` - q `compliance`.
+    The tool has m nodes along its depth below each of n contact nodes. The flux is q = `conductance`
+    (`face_temperature` - T) with the temperature T of the body. The tool's temperatures change in the stage by `change`
+    - q `compliance`.
 
     Attributes:
         face_temperature: temperature of the face of the tool at the end of the stage if q were 0, shape (n,).
-        conductance: conductance of contact and line in series, heat per time, area and degree, shape (n,).
-        change: change of temperature of the lines in the stage if q were 0, shape (n, m).
-        compliance: decrease of the temperatures of a line per unit of flux q, shape (m,).
+        conductance: conductance of contact and tool in series, heat per time, area and degree, shape (n,).
+        change: change of the temperatures of the tool in the stage if q were 0, shape (n, m).
+        compliance: decrease of the m temperatures below a contact node per unit of flux q, shape (m,).
     """
 
     face_temperature: np.ndarray
@@ -148,8 +150,9 @@ class ToolResponse(NamedTuple):
 class HeatContact:
     """Contact nodes of a face with a tool, and the temperatures in the tool below them.
 
-    The face has n locally owned nodes. A line has the temperatures at m depths below a node, above the temperature of
-    the back of the tool, the face first. All lines have the shape (n, m); m = 0 for a tool of prescribed temperature.
+    The face has n locally owned nodes. Below each, the tool has m nodes along its depth, from its face to the last one
+    before its back. Their excess temperatures over the back are differences to its temperature, shape (n, m). A tool of
+    prescribed temperature has m = 0.
 
     Args:
         contact: the `ContactWithTool`.
@@ -163,8 +166,8 @@ class HeatContact:
         area: tributary deformed area of each node over the heat capacity of the body, shape (n,); set by `Conduction`.
         conductance: contact conductance of each node, heat per time, area and degree, shape (n,); 0 without contact.
         back: temperature of the back of a conducting tool, or prescribed temperature of the tool.
-        depths: distances of the m nodes of a line, then of the back, from the face of the tool, shape (m + 1,), length;
-            empty for a tool of prescribed temperature.
+        depths: distances of the m nodes along the depth, then of the back, from the face of the tool, shape (m + 1,),
+            length; empty for a tool of prescribed temperature.
     """
 
     def __init__(self, contact: ContactWithTool, dofs: np.ndarray, points: np.ndarray):
@@ -173,10 +176,10 @@ class HeatContact:
         self.conductance = np.full(len(dofs), contact.conductance)
         tool = contact.tool
         if isinstance(tool, ConductingTool):
-            self.back, self._above, self.depths = tool.back, tool.start - tool.back, tool.depths
+            self.back, self._initial_excess, self.depths = tool.back, tool.start - tool.back, tool.depths
             self._M, self._K = tool.matrices()
         else:
-            self.back, self._above, self.depths = tool, 0.0, np.zeros(0)
+            self.back, self._initial_excess, self.depths = tool, 0.0, np.zeros(0)
             self._M, self._K = np.zeros((2, 0, 0))
         self._factor = lru_cache(maxsize=4)(self._factorise)
 
@@ -186,52 +189,55 @@ class HeatContact:
         return len(self._M) > 0
 
     def start(self) -> np.ndarray:
-        """Return the initial temperatures of the lines above the back of the tool.
+        """Return the initial excess temperatures of the tool: its temperatures minus the temperature of its back.
 
         Returns:
-            Lines, shape (n, m), degrees.
+            Excess temperatures at the m nodes along the depth below each of the n contact nodes, shape (n, m), degrees.
         """
-        return np.full((len(self.dofs), len(self._M)), self._above)
+        return np.full((len(self.dofs), len(self._M)), self._initial_excess)
 
-    def face(self, lines: np.ndarray) -> np.ndarray:
-        """Return the temperature of the face of the tool at each contact node.
+    def face(self, excess: np.ndarray) -> np.ndarray:
+        """Return the temperature of the face of the tool at each of the n contact nodes.
 
         Args:
-            lines: temperatures of the lines above the back of the tool, shape (n, m).
+            excess: excess temperatures of the tool over its back, at the m nodes along the depth below each contact
+                node, the face first, shape (n, m), degrees.
 
         Returns:
             Temperatures, shape (n,).
         """
-        return self.back + lines[:, 0] if self.conducts else np.full(len(self.dofs), self.back)
+        return self.back + excess[:, 0] if self.conducts else np.full(len(self.dofs), self.back)
 
-    def rates(self, lines: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the flux into the body and the rates of heat of the lines.
+    def rates(self, excess: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return the flux into the body and the rates of heat in the tool.
 
         Args:
-            lines: temperatures of the lines above the back of the tool, shape (n, m).
+            excess: excess temperatures w of the tool over its back, at the m nodes along the depth below each of the n
+                contact nodes, shape (n, m), degrees. The face comes first.
             T: temperatures of the body at the contact nodes, shape (n,).
 
         Returns:
-            Flux q into the body, heat per time and area, shape (n,); rates of heat M dw/dt at the nodes of the lines,
-            per contact area, shape (n, m). M is the capacity matrix of a line, w its temperature.
+            Flux q into the body, heat per time and area, shape (n,). Rates of heat M dw/dt at the nodes of the tool per
+            contact area, with the capacity matrix M along the depth, shape (n, m).
         """
-        q = self.conductance * (self.face(lines) - T)
-        rate = -lines @ self._K
+        q = self.conductance * (self.face(excess) - T)
+        rate = -excess @ self._K
         rate[:, :1] -= q[:, None]
         return q, rate
 
-    def response(self, lines: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> ToolResponse:
-        r"""Return the linear response of the lines to the flux q into the body, in an implicit stage of a time step.
+    def response(self, excess: np.ndarray, known: np.ndarray, c: float, absolute: bool = True) -> ToolResponse:
+        r"""Return the linear response of the tool to the flux q into the body, in an implicit stage of a time step.
 
         .. math:: M \Delta = k - c K (w + \Delta) - c q e_1
 
-        M and K are the capacity and conductivity matrices of a line, w its temperatures and Delta their change. The
-        vector e_1 is 1 at the node on the face of the tool, else 0.
+        M and K are the capacity and conductivity matrices along the depth of the tool, and Delta is the change of its
+        excess temperatures w. The vector e_1 is 1 at the node on the face of the tool, else 0.
 
         Args:
-            lines: temperatures w of the lines above the back of the tool, shape (n, m).
-            known: heat k per contact area from earlier stages, at the nodes of the lines, shape (n, m).
-            c: factor c of the rate, time.
+            excess: excess temperatures w of the tool over its back, at the m nodes along the depth below each of the n
+                contact nodes, shape (n, m), degrees. The face comes first.
+            known: heats k per contact area at the nodes of the tool, from earlier stages of the step, shape (n, m).
+            c: time c by which the stage multiplies rates of heat.
             absolute: False if the temperatures of body and tool are differences of two states; the back then has 0.
 
         Returns:
@@ -239,32 +245,40 @@ class HeatContact:
         """
         back = self.back if absolute else 0.0
         if not self.conducts:
-            return ToolResponse(np.full(len(self.dofs), back), self.conductance, lines, np.zeros(0))
+            return ToolResponse(np.full(len(self.dofs), back), self.conductance, excess, np.zeros(0))
         inverse, compliance = self._factor(c)
-        change = (known - c * lines @ self._K) @ inverse
+        change = (known - c * excess @ self._K) @ inverse
         in_series = self.conductance / (1 + self.conductance * compliance[0])
-        return ToolResponse(back + lines[:, 0] + change[:, 0], in_series, change, compliance)
+        return ToolResponse(back + excess[:, 0] + change[:, 0], in_series, change, compliance)
 
     def flux_and_change(self, response: ToolResponse, known: np.ndarray, T: np.ndarray,
                         c: float) -> tuple[Any, Any, Any]:
-        """Return the flux and the change of the lines at the end of a stage.
+        """Return the flux, and the changes and rates in the tool, at the end of an implicit stage of a time step.
+
+        The tool has m nodes along its depth below each of the n contact nodes.
 
         Args:
             response: result of `response`.
-            known: heat per contact area from earlier stages, at the nodes of the lines, shape (n, m).
+            known: heats per contact area at the nodes of the tool, from earlier stages of the step, shape (n, m).
             T: temperatures of the body at the contact nodes, shape (n,).
-            c: factor of the rate, time.
+            c: time by which the stage multiplies rates of heat.
 
         Returns:
-            Flux q into the body, heat per time and area, shape (n,). Changes of temperature of the lines, degrees,
-            shape (n, m). Rates of heat of the lines per contact area, shape (n, m).
+            Flux q into the body, heat per time and area, shape (n,). Changes of temperature in the tool, degrees, shape
+            (n, m). Rates of heat at the nodes of the tool per contact area, shape (n, m).
         """
         q = response.conductance * (response.face_temperature - T)
         change = response.change - np.outer(q, response.compliance)
         return q, change, (change @ self._M - known) / c
 
     def _factorise(self, c: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return (M + c K)^-1, shape (m, m), and c times its first column, for capacity and conductivity matrices M, K.
+        """Return (M + c K)^-1, and its first column times c: the decrease of temperatures by a unit flux at the face.
+
+        M and K are the capacity and conductivity matrices for the m nodes along the depth of the tool. Shapes of the
+        results: (m, m) and (m,).
+
+        Args:
+            c: time by which the stage of a time step multiplies rates of heat.
         """
         inverse = np.linalg.inv(self._M + c * self._K)
         return inverse, c * inverse[:, 0]

@@ -123,7 +123,7 @@ class Cooling:
         """Return the heat conduction of a part after demoulding: without tools, with other laws at the faces.
 
         A prescribed temperature of a face would change the stress at once by a finite amount. It is replaced by
-        convection with the large conductance `_SUDDEN_CONDUCTANCE` conductivity/thickness.
+        convection with a large conductance: `_SUDDEN_CONDUCTANCE` times the conductivity over the thickness.
 
         Args:
             mesh: `Mesh` of the body.

@@ -44,8 +44,8 @@ class HeatState(NamedTuple):
     Attributes:
         time: process time at the end of the step.
         temperature: temperatures of the body, locally owned entries, shape (n,).
-        lines: for each tool contact, temperatures in the tool, above its back, shape (contact nodes, m); see
-            `HeatContact`.
+        tool_excess: for each tool contact, excess temperatures of the tool over its back, shape (contact nodes, m). The
+            m nodes lie along the depth below each contact node, the face first.
         step: length of the next time step of the heat equation, time; None before the first step.
         power: heat per time of the dissipated work at the nodes, over the heat capacity of the body, degrees per time,
             locally owned entries, shape (n,); None without heating by work.
@@ -54,7 +54,7 @@ class HeatState(NamedTuple):
 
     time: float
     temperature: np.ndarray
-    lines: list[np.ndarray]
+    tool_excess: list[np.ndarray]
     step: float | None
     power: np.ndarray | None
     before: tuple[float, np.ndarray] | None
@@ -219,8 +219,8 @@ class CoolingHistory:
         Returns:
             The state.
         """
-        return HeatState(self._time, self._state[0].copy(), [lines.copy() for lines in self._state[1:]], self._dt,
-                      self._power, self._before)
+        return HeatState(self._time, self._state[0].copy(), [excess.copy() for excess in self._state[1:]], self._dt,
+                         self._power, self._before)
 
     def put(self, variables: HeatState) -> None:
         """Set the present state of the heat equation.
@@ -230,7 +230,7 @@ class CoolingHistory:
         """
         self._time, self._dt = variables.time, variables.step
         self._power, self._before = variables.power, variables.before
-        self._state = [variables.temperature.copy(), *(lines.copy() for lines in variables.lines)]
+        self._state = [variables.temperature.copy(), *(excess.copy() for excess in variables.tool_excess)]
         self._update_problem()
 
     def save(self, variables: HeatState) -> dict[str, Any]:
@@ -247,8 +247,8 @@ class CoolingHistory:
                 "temperature": plain(variables.temperature),
                 **({} if variables.before is None else {"before": [variables.before[0], plain(variables.before[1])]}),
                 **({} if variables.power is None else {"power": plain(variables.power)}),
-                "lines": [{"points": plain(touch.points), "above_back": plain(lines)}
-                          for touch, lines in zip(self._body.tool_contacts, variables.lines, strict=True)]}
+                "tools": [{"points": plain(touch.points), "excess": plain(excess)}
+                          for touch, excess in zip(self._body.tool_contacts, variables.tool_excess, strict=True)]}
 
     def load(self, data: dict[str, Any]) -> HeatState:
         """Return the state of the heat equation of this rank from stored data.
@@ -266,10 +266,11 @@ class CoolingHistory:
         if ("power" in data) != (self._dissipated is not None):
             raise InputError("the temperature history belongs to a scene with another work_to_heat")
         power = np.array(data["power"])[rows] if "power" in data else None
-        lines = [np.array(d["above_back"])[_matching_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
-                 for touch, d in zip(self._body.tool_contacts, data["lines"], strict=True)]
+        tool_excess = [np.array(d["excess"])[_matching_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
+                       for touch, d in zip(self._body.tool_contacts, data["tools"], strict=True)]
         before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
-        return HeatState(float(data["time"]), np.array(data["temperature"])[rows], lines, data["step"], power, before)
+        return HeatState(float(data["time"]), np.array(data["temperature"])[rows], tool_excess, data["step"], power,
+                         before)
 
     def transfer(self, source: CoolingHistory, variables: HeatState, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
@@ -289,13 +290,13 @@ class CoolingHistory:
         """
         comm, before = self._problem.comm, variables.before
         to_body = MovingLeastSquares(comm, mapping(source._body.points), self._body.points).fitted
-        touched = (zip(source._body.tool_contacts, variables.lines, strict=True)
+        touched = (zip(source._body.tool_contacts, variables.tool_excess, strict=True)
                    if self._body.tool_contacts else ())     # a released body has no tools
-        lines = [MovingLeastSquares(comm, mapping(other.points), touch.points).fitted(kept)
-                 for touch, (other, kept) in zip(self._body.tool_contacts, touched, strict=True)]
+        tool_excess = [MovingLeastSquares(comm, mapping(other.points), touch.points).fitted(excess)
+                       for touch, (other, excess) in zip(self._body.tool_contacts, touched, strict=True)]
         power = None if variables.power is None else self._cooling.work_to_heat * self._body.assembled(self._dissipated)
-        return HeatState(variables.time, to_body(variables.temperature), lines, variables.step, power,
-                      before and (before[0], to_body(before[1])))
+        return HeatState(variables.time, to_body(variables.temperature), tool_excess, variables.step, power,
+                         before and (before[0], to_body(before[1])))
 
     def _update_problem(self) -> None:
         """Pass the temperatures at start and end of the step to the problem, for its temperature-dependent constants.

@@ -94,14 +94,17 @@ def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-    """Return the cuts of the edges, as {node numbers of the ends of an edge: positions of the cuts on it, from 0 to 1}.
+    """Return where the edges of elements are cut, so that elements below heated or cooled faces become thin layers.
 
-    The end of smaller (R, Z) comes first, and the positions count from it. Edges without cuts are left out.
+    Returns:
+        {(first, last): cuts}: node numbers of the ends of an edge, and the increasing positions of its cuts, where 0 is
+        the first end and 1 the last. The first end has the smaller (R, Z). Edges without cuts are left out.
 
     Args:
         grid: the grid.
         depths: {boundary: penetration depths of heat at the first and the last time of interest, length}.
-        points: positions of the nodes between which depths are measured, shape (n, 2), length.
+        points: positions of the nodes of the grid in the configuration in which depths below a boundary are measured,
+            shape (n, 2), length.
     """
     if not depths:
         return {}
@@ -148,7 +151,7 @@ class _Nodes:
 
     Args:
         grid: the grid before the cut.
-        cuts: {ends of an edge: positions of its cuts, from 0 to 1}, from `_cuts`.
+        cuts: {(first, last): cuts}: node numbers of the ends of an edge, and the positions of its cuts, from 0 to 1.
 
     Attributes:
         points: positions of all nodes so far, length.
@@ -217,7 +220,12 @@ def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _cut_grid(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
-    """Return the grid with its edges cut at the positions of `_cuts`, and its triangles cut between them."""
+    """Return the grid with edges cut, and its triangles cut into rows between these cuts.
+
+    Args:
+        grid: the grid.
+        cuts: {(first, last): cuts}: node numbers of the ends of an edge, and the positions of its cuts, from 0 to 1.
+    """
     nodes = _Nodes(grid, cuts)
     quadratic = next(iter(grid.layers.values())).shape[1] == 6
     layers, boundaries = {}, {}

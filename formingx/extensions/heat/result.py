@@ -131,7 +131,7 @@ class HeatRun:
         T.x.scatter_forward()
         return T
 
-    def at(self, points: Any, times: Any = None) -> np.ndarray:
+    def at_points(self, points: Any, times: Any = None) -> np.ndarray:
         """Return temperatures of the body at points and times.
 
         Args:
@@ -166,7 +166,7 @@ class HeatRun:
         """
         first, last = np.array(self._default_line() if line is None else line, dtype=float).reshape(2, 2)
         s = np.linspace(0, 1, points)
-        return s * float(np.hypot(*(last - first))), self.at(first + np.outer(s, last - first), times)
+        return s * float(np.hypot(*(last - first))), self.at_points(first + np.outer(s, last - first), times)
 
     def mean_through(self, times: Any = None, *, line: Any = None) -> np.ndarray:
         """Return the mean temperature along a straight line through the body, by Simpson's rule.
@@ -240,12 +240,12 @@ class HeatRun:
         later = [t for t in self._times if t > reached]
         return Window(reached, self._first_time_inside(lambda t: -excess(t), later, from_time=reached))
 
-    def tool_profile(self, on: str, at: Any, time: float | None = None) -> tuple[np.ndarray, np.ndarray]:
+    def tool_profile(self, on: str, point: Any, time: float | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Return temperatures along the depth of a conducting tool, below the contact node nearest to a point.
 
         Args:
             on: name of the boundary in contact with the tool.
-            at: reference position (R, Z) of the point, length.
+            point: reference position (R, Z) of the point, length.
             time: the time; default the end of the run.
 
         Returns:
@@ -257,12 +257,12 @@ class HeatRun:
         conducting = {t.on: k for k, t in enumerate(self._body.tool_contacts) if t.conducts}
         known("tool_profile: conducting tool on boundary", on, conducting)
         number = conducting[on]
-        touch, lines = self._body.tool_contacts[number], self._state_at(time)[1 + number]
-        away = np.hypot(*(touch.points - np.asarray(at, dtype=float)).T)
+        touch, excess = self._body.tool_contacts[number], self._state_at(time)[1 + number]
+        away = np.hypot(*(touch.points - np.asarray(point, dtype=float)).T)
         mine = (away.min(initial=np.inf), self._comm.rank)
         nearest = min(self._comm.allgather(mine))
-        line = self._comm.bcast(lines[np.argmin(away)] if nearest == mine else None, root=nearest[1])
-        return touch.depths, touch.back + np.append(line, 0.0)
+        below = self._comm.bcast(excess[np.argmin(away)] if nearest == mine else None, root=nearest[1])
+        return touch.depths, touch.back + np.append(below, 0.0)
 
     def to_csv(self, file: Any) -> None:
         """Write a CSV file with one row per step (rank 0 writes).

@@ -94,10 +94,17 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
 
 def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
             times: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return {boundary: penetration depths of heat at the first and the last time of interest, length}.
+    """Return {boundary: (smallest, largest) penetration depth of heat, length}.
 
-    A depth is sqrt(a t) with the diffusivity a at the time t. At a boundary with absorption the first depth is at most
-    1 / absorption coefficient. materials: {layer: material}. boundaries: laws of heat. times: output times, shape (n,).
+    A depth is sqrt(a t). The smallest belongs to the smallest diffusivity a of all layers, at the first output time or
+    at `_FIRST_ACCURATE_TIME` of the last one, if that is earlier. The largest belongs to the largest diffusivity, at
+    the last output time. At a boundary with absorption the smallest is 1 / absorption coefficient, or the smaller of
+    both if another law acts there too.
+
+    Args:
+        materials: {layer: `ThermalProperties`}.
+        boundaries: laws of heat.
+        times: output times, shape (n,).
     """
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())

@@ -31,12 +31,12 @@ class SpaceError:
     def largest(self, state: list[np.ndarray], time: float) -> float:
         """Estimate the largest discretisation error of the temperature in a state; collective.
 
-        The residual contains the present temperatures of the faces of tools. The temperatures of the tools change with
-        the correction of the body.
+        The estimate is the largest entry of the correction e (see the module). Its right-hand side contains the present
+        temperatures of the faces of tools. In the matrix the tools respond to e: their temperatures change with it.
 
         Args:
-            state: [temperatures of the body, shape (n,); temperatures in each tool in contact, shape (contact nodes,
-                m)].
+            state: temperatures of the body, shape (n,). Then for each tool in contact its excess temperatures over its
+                back, at m nodes along the depth, shape (contact nodes, m).
             time: time since the start of the run.
 
         Returns:
@@ -44,31 +44,32 @@ class SpaceError:
         """
         body, finer = self._body, self._finer
         slope = body.slope(body.rates(state)[0][0])
-        lines = [self._face_temperatures(*each)
-                 for each in zip(body.tool_contacts, finer.tool_contacts, state[1:], strict=True)]
-        rates, _ = finer.rates([self._in_cubic_space(state[0]), *lines])
+        in_tools = [self._face_temperatures(*each)
+                    for each in zip(body.tool_contacts, finer.tool_contacts, state[1:], strict=True)]
+        rates, _ = finer.rates([self._in_cubic_space(state[0]), *in_tools])
         residual = time * (rates[0] - finer.mass(self._in_cubic_space(slope)))
-        return finer.difference([residual, *(np.zeros_like(line) for line in lines)], time)
+        return finer.difference([residual, *map(np.zeros_like, in_tools)], time)
 
     def destroy(self) -> None:
         """Free the PETSc objects of `finer` (collective)."""
         self._finer.destroy()
 
-    def _face_temperatures(self, touch: HeatContact, finer: HeatContact, lines: np.ndarray) -> np.ndarray:
-        """Return temperatures of a tool above its back, at contact nodes of cubic elements, shape (nodes, m), degrees.
+    def _face_temperatures(self, touch: HeatContact, finer: HeatContact, excess: np.ndarray) -> np.ndarray:
+        """Return the excess temperatures of a tool over its back, for the contact nodes of cubic elements, degrees.
 
-        The temperature of its face is interpolated; the other entries are 0.
+        Column 0 is the face of the tool, interpolated from the contact nodes of the quadratic elements. The other m - 1
+        columns belong to nodes at a depth in the tool. They are 0, because they have no effect on the body.
 
         Args:
             touch: contact with the tool, of the quadratic elements.
             finer: the same contact, of the cubic elements.
-            lines: temperatures of the tool at the contact nodes of quadratic elements, above its back, shape (nodes,
-                m), degrees.
+            excess: excess temperatures of the tool over its back for the contact nodes of the quadratic elements, shape
+                (contact nodes, m), degrees. The m nodes lie along the depth, the face first.
         """
-        found = np.zeros((len(finer.dofs), lines.shape[1]))
+        found = np.zeros((len(finer.dofs), excess.shape[1]))
         if touch.conducts:
             values = np.zeros(len(self._body.points))
-            values[touch.dofs] = lines[:, 0]
+            values[touch.dofs] = excess[:, 0]
             found[:, 0] = self._in_cubic_space(values)[finer.dofs]
         return found
 

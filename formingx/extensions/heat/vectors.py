@@ -85,13 +85,14 @@ class HeatVectors:
         return self._form(make(self._scale * self._v))
 
     def assembled(self, form: Any) -> np.ndarray:
-        """Assemble the form of a heat source, as `power` stores it.
+        """Assemble the form of a heat source: its heat per time at each node, divided by the capacity of the body.
 
         Args:
             form: result of `source`.
 
         Returns:
-            Heat per time over `capacity`, locally owned entries, shape (n,).
+            Heat per time over the heat capacity of the whole body (`capacity`), degrees per time, locally owned
+            entries, shape (n,).
         """
         return self._assemble(form)
 
@@ -108,7 +109,14 @@ class HeatVectors:
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def _body_rate(self, T: np.ndarray) -> np.ndarray:
-        """Set `self.T` to T; return rates of heat over `capacity`, without tools, locally owned entries, shape (n,)."""
+        """Set the temperature `T` and return the heat per time that each node receives, without heat from tools.
+
+        It is divided by the heat capacity of the whole body (`capacity`), degrees per time, locally owned entries,
+        shape (n,).
+
+        Args:
+            T: nodal temperatures of the body, locally owned entries, shape (n,).
+        """
         self.T.x.array[: self._n] = T
         self.T.x.scatter_forward()
         return self._assemble(self._rate_form) + self.power

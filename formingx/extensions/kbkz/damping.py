@@ -23,15 +23,15 @@ class Damping:
     """
 
     def __call__(self, I1: Any, I2: Any) -> Any:
-        """Return h at invariants I1 and I2 of equal shape."""
+        """Return the damping h, the factor of a past state's stress, at invariants I1 and I2 of equal shape."""
         return self.derivatives(I1, I2)[0]
 
     def derivatives(self, I1: Any, I2: Any) -> tuple[Any, Any, Any]:
-        """Return h and its derivatives by the invariants of the Finger tensor.
+        """Return the damping h, the factor of a past state's stress, and its derivatives by the invariants.
 
         Args:
-            I1: first invariant, any shape.
-            I2: second invariant, the same shape.
+            I1: trace of the Finger tensor B of the deformation since the past state, any shape.
+            I2: trace of the inverse of B, the same shape.
 
         Returns:
             h, dh/dI1 and dh/dI2, the same shape each.

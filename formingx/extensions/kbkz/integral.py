@@ -63,13 +63,14 @@ class MemoryIntegral:
         return PastStates(forms, terms)
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
-        """Return the weights w of K past states in the stress, for each relaxation mode (G, tau) of unit modulus.
+        """Return the weights w of K past states in the stress, for relaxation modes with the modulus 1 in place of G.
 
         Args:
-            ages: ages of the states in reduced time, descending, the last 0, shape (K,) or (K, n), time.
+            ages: ages of the states in reduced time, descending, the last 0, time. Shape (K,), or (K, n) if they differ
+                between n points.
 
         Returns:
-            Weights, shape (K, modes) or (K, modes, n).
+            Weights, dimensionless, shape (K, modes) or (K, modes, n).
         """
         x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
         step, young = x[:-1] - x[1:], np.exp(-x[1:])
@@ -90,17 +91,20 @@ class MemoryIntegral:
                       allowed: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the weights W of K past states in the stress at the end of a step in reduced time.
 
-        The step is exact if h Cbar_k^-1 is a parabola in time through the last two states and the end of the step. So
-        it is of second order even for steps far longer than the relaxation times (as in `TransientNetwork`).
+        The stress is the sum of W h Cbar_k^-1 over the past states k, with the damping h and the isochoric right
+        Cauchy-Green tensor Cbar_k. The weights are exact if h Cbar_k^-1 is a parabola in time through the last two
+        states and the end of the step. So a step is of second order even if it is far longer than the relaxation times.
 
         Args:
             weights: result of `weights` at the start of the step, shape (K, modes) or (K, modes, n).
-            step: length of the step in reduced time, a number or shape (n,).
-            before: reduced time between the last two states; 0: not known, and no parabola is used.
-            allowed: 1, or 0 at points where these two states differ too much for a parabola, shape (n,).
+            step: length of the step in reduced time, a number or, if it differs between n points, shape (n,).
+            before: length of the previous step in reduced time, a number or shape (n,). 0: no parabola, and h Cbar_k^-1
+                is linear in the step.
+            allowed: 1 where a parabola is used, 0 at points where the last two states differ too much, shape (n,).
 
         Returns:
-            Weights W and dW/dstep, shape (K, n) or (K, 1) each, stress and stress/time.
+            Weights W, stress, and their derivatives by the length of the step, stress/time, shape (K, n) or (K, 1)
+            each.
         """
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
@@ -131,10 +135,12 @@ class MemoryIntegral:
         Args:
             C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
             past: entries of Cbar in the past states, shape (K, 4, n).
-            smallest_h: smallest damping h of each state so far, shape (K, n), or None.
+            smallest_h: smallest value that the damping h of each state has had since then, which bounds it now, shape
+                (K, n). None: h is not bounded.
 
         Returns:
-            Inverse tensors of the past states, shape (K, 4, n); damping h and dh/dI1, dh/dI2, shape (K, n) each.
+            Inverse tensors of the past states, shape (K, 4, n). Damping h, the factor of a past state's stress, and its
+            derivatives by the invariants I1 and I2 of the Finger tensor since that state, shape (K, n) each.
         """
         inverse = _inverse(past)
         if self.damping is None:
@@ -156,8 +162,9 @@ class MemoryIntegral:
             C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
             past: entries of Cbar in the past states, shape (K, 4, n).
             W: weights of the states, shape (K, n), stress.
-            slope: derivatives of the weights by the length of the step in reduced time, shape (K, n).
-            smallest_h: smallest damping h of each state so far, shape (K, n), or None.
+            slope: derivatives of the weights by the length of the step in reduced time, shape (K, n), stress/time.
+            smallest_h: smallest value that the damping h of each state has had since then, which bounds it now, shape
+                (K, n). None: h is not bounded.
 
         Returns:
             Stress S, dS/dCbar and dS/dstep, shapes (4, n), (4, 4, n) and (4, n).
@@ -175,14 +182,17 @@ class MemoryIntegral:
     def potential(self, C: Any, coefficients: dict[str, Any], time_step: Any) -> Any:
         r"""Return a potential whose derivative by F is the stress, without the unsymmetric part of dS/dCbar.
 
-        .. math:: \tfrac12 (S_0 + T \Delta t) : \bar C + \tfrac14 \Delta \bar C : D : \Delta \bar C
+        .. math:: \tfrac12 (S_0 + T \Delta t) : \bar C
+            + \tfrac14 (\bar C - \bar C_0) : D : (\bar C - \bar C_0)
 
-        S0, T = dS/dt, D = dS/dCbar and the Cbar from which its change counts are coefficients of the form.
+        S is linearised about the state of the last refresh, with the isochoric right Cauchy-Green tensor Cbar_0 and the
+        time step dt_0. There T = dS/dt and D = dS/dCbar, and S_0 is S - T dt_0. The present ones are Cbar and Delta t.
 
         Args:
             C: entries 11, 22, 12, 33 of Cbar (UFL).
-            coefficients: {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
-            time_step: length of the step (UFL scalar, time).
+            coefficients: {name: UFL coefficient}: "past_S" for S_0, "past_C" for Cbar_0, "past_D" for D, "past_T" for
+                T.
+            time_step: present length Delta t of the step (UFL scalar, time).
 
         Returns:
             The potential (UFL, stress).
@@ -193,27 +203,38 @@ class MemoryIntegral:
         return (linear + sum(D[i, j] * change[i] * change[j] for i in range(4) for j in range(4)) / 2) / 2
 
     def unsymmetric_work(self, C: Any, dC: Any, coefficients: dict[str, Any]) -> Any:
-        """Return the virtual work of the unsymmetric part of dS/dCbar, which has no potential (see `potential`).
+        r"""Return the virtual work of the unsymmetric part of D = dS/dCbar, which has no potential.
+
+        .. math:: \tfrac14 \delta \bar C : (D - D^T) : (\bar C - \bar C_0)
+
+        Cbar_0 is the isochoric right Cauchy-Green tensor at the last refresh, about which the stress S is linearised.
+        There the work is 0.
 
         Args:
-            C: entries 11, 22, 12, 33 of Cbar (UFL).
+            C: entries 11, 22, 12, 33 of the present Cbar (UFL).
             dC: virtual changes of these entries (UFL).
-            coefficients: {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
+            coefficients: {name: UFL coefficient}: "past_C" for Cbar_0, "past_D" for D.
 
         Returns:
-            Virtual work per reference volume (UFL, stress); 0 at the Cbar of the last refresh of the coefficients.
+            Virtual work per reference volume (UFL, stress).
         """
         D, change = coefficients["past_D"], _change(C, coefficients)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
 
 def _inverse(C: np.ndarray) -> np.ndarray:
-    """Return the entries of the inverse of tensors of determinant 1, shape (..., 4, n)."""
+    """Return the entries 11, 22, 12, 33 of the inverses of tensors of determinant 1.
+
+    C: entries 11, 22, 12, 33 of the tensors at n points, shape (..., 4, n), as the result.
+    """
     return np.stack(cofactor(entries(np.moveaxis(C, -2, 0))), axis=-2)
 
 
 def _change(C: Any, coefficients: dict[str, Any]) -> list[Any]:
-    """Return the change of the entries of Cbar = J^(-2/3) C (UFL) since the coefficients of the form were refreshed."""
+    """Return the change of the entries 11, 22, 12, 33 of Cbar = J^(-2/3) C since the stress was last linearised (UFL).
+
+    C: present entries of Cbar. coefficients: {name: UFL coefficient}; "past_C" has the entries at the linearisation.
+    """
     return [C[i] - coefficients["past_C"][i] for i in range(4)]
 
 
@@ -231,12 +252,18 @@ def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
 
 
 def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
-    """Return the factors f, f (1 + s), f s of the three states that fix a parabola in time, with f = s/(1 + s).
+    r"""Return the factors of the three states that fix a parabola in time, shape of s each.
 
-    They belong to the states at the end and at the start of the step, and at the start of the previous step. The first
-    and the last count negative. They decrease from s = 2 on and are 0 from s = 4 on, where BDF2 is unstable.
+    At the part t of the step the parabola deviates from its chord by
 
-    s: ratio of the step to the previous one, dimensionless.
+    .. math:: -t (1 - t) \left(f y_1 - f (1 + s) y_0 + f s y_{-1}\right), \qquad f = \frac{s}{1 + s}
+
+    with the values y_1 at the end of the step, y_0 at its start and y_-1 at the start of the previous step. The results
+    are f, f (1 + s) and f s. For s from 2 to 4 all three are reduced gradually to 0, since BDF2 is unstable for long
+    steps.
+
+    Args:
+        s: length of the step over the length of the previous one, any shape.
     """
     s = np.minimum(s, 4.0)
     share = np.minimum(1.0, 2 - s / 2) * s
@@ -244,14 +271,22 @@ def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
 
 
 def _parabola_factor_slopes(s: Any) -> tuple[Any, Any]:
-    """Return the derivatives of the last two results of `_parabola_factors` by the step ratio s."""
+    """Return the derivatives by s of the factors of the states at the start of a step, and of the previous step.
+
+    s: length of the step over the length of the previous one, any shape, as of the results.
+    """
     s = np.minimum(s, 4.0)
     share, slope = np.minimum(1.0, 2 - s / 2) * s, np.where(s < 2, 1.0, np.where(s < 4, 2 - s, 0.0))
     return slope, slope * s / (1 + s) + share / (1 + s) ** 2
 
 
 def _quadratic_weight(x: np.ndarray) -> np.ndarray:
-    """Return [x - 2 + (x + 2) e^-x]/x^2, the weight of a parabola's bulge over a step of x relaxation times."""
+    """Return [x - 2 + (x + 2) e^-x]/x^2, by which the deviation of a parabola from its chord enters the stress.
+
+    It is the integral of t (1 - t) over a step, t from 0 to 1, with the memory function x exp(-x (1 - t)) as weight.
+
+    x: length of the step over the relaxation time, any shape, as of the result.
+    """
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)
@@ -259,7 +294,10 @@ def _quadratic_weight(x: np.ndarray) -> np.ndarray:
 
 
 def _quadratic_weight_slope(x: np.ndarray) -> np.ndarray:
-    """Return the derivative of `_quadratic_weight` by x."""
+    """Return the derivative of [x - 2 + (x + 2) e^-x]/x^2 by x.
+
+    x: length of the step over the relaxation time, any shape, as of the result.
+    """
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = 1 / 6 - x / 6 + 3 * x**2 / 40 - x**3 / 45 + 5 * x**4 / 1008

@@ -87,7 +87,10 @@ class PastStates:
         self.put(StoredStates(0.0, (undeformed,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def forget_motion(self) -> None:
-        """Discard the length of the last step, so that the next step is integrated without a parabola through it."""
+        """Discard the length of the last step: the stress of a past state is then linear in time over the next step.
+
+        With this length it would be a parabola through the last two states and the end of the step.
+        """
         self._before = 0.0
         self._refreshed = None
 
@@ -190,8 +193,9 @@ class PastStates:
 
         Args:
             states: K past states, the last of them the present one.
-            C: entries of the present Cbar, shape (4, n).
-            smallest_h: smallest damping of each state so far, shape (K, n), or None.
+            C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C at n points, shape (4, n).
+            smallest_h: smallest value that the damping h of each state has had since then, shape (K, n); h is the
+                factor of its stress. None: h is not bounded.
         """
         if len(states) < 5:
             return list(range(len(states)))
@@ -218,7 +222,11 @@ class PastStates:
         return [*chosen, len(states) - 1]
 
     def _present(self) -> tuple[np.ndarray, Any, Any]:
-        """Return the present Cbar, shape (4, n); reduced time since the last state; its rate per process time."""
+        """Return present values: entries 11, 22, 12, 33 of Cbar, shape (4, n), reduced time since the last state, rate.
+
+        The rate is the reduced time per process time. Both are numbers, or have shape (n,) if the reduced time depends
+        on the temperature.
+        """
         step: Any = self._forms.time_now - self._stored.time
         rate: Any = 1.0
         if not len(self._own):
@@ -230,7 +238,7 @@ class PastStates:
 
     @property
     def material(self) -> Any:
-        """Material with these past states."""
+        """Material that these past states belong to."""
         return self._terms.material
 
     def smallest_stretch(self) -> tuple[float, np.ndarray]:
@@ -264,10 +272,10 @@ class PastStates:
             """
             each = values.reshape(-1, len(self._own), len(self._terms.places)).transpose(1, 0, 2)
             return gathered(self._forms.comm, each)[order]
-        states = [{"felt": of_all(s.reduced_time) if self._aT else s.reduced_time, "C": of_all(s.C)}
+        states = [{"reduced_time": of_all(s.reduced_time) if self._aT else s.reduced_time, "C": of_all(s.C)}
                   for s in variables.states]
         return {"time": variables.time, "cells": numbers[order], "states": states,
-                **({} if variables.smallest_h is None else {"least": of_all(variables.smallest_h)})}
+                **({} if variables.smallest_h is None else {"smallest_h": of_all(variables.smallest_h)})}
 
     def load(self, data: dict[str, Any]) -> StoredStates:
         """Return the past states of this rank from stored data.
@@ -283,18 +291,18 @@ class PastStates:
         """
         numbers = np.array(data.get("cells", []), dtype=np.int64)
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
-        found = [(np.array(s["felt"], float), np.array(s["C"], float)) for s in data.get("states", [])]
+        found = [(np.array(s["reduced_time"], float), np.array(s["C"], float)) for s in data.get("states", [])]
         shape = len(numbers), 4, len(self._terms.places)
         if not np.array_equal(numbers[rows], self._numbers) or not found or any(
                 C.shape != shape or (time.ndim > 0) != bool(self._aT) for time, C in found) \
-                or ("least" in data) != self._law.irreversible:
+                or ("smallest_h" in data) != self._law.irreversible:
             raise InputError(f"the history of {self._terms.material} belongs to another mesh, or to another material")
 
         def own(values: np.ndarray) -> np.ndarray:
             """Return the values of the cells of this rank, shape (..., n), from the values of all cells."""
             return values[rows].transpose(1, 0, 2).reshape(values.shape[1], -1)
         states = tuple(PastState(own(time)[0] if self._aT else float(time), own(C)) for time, C in found)
-        smallest_h = own(np.array(data["least"], float)) if "least" in data else None
+        smallest_h = own(np.array(data["smallest_h"], float)) if "smallest_h" in data else None
         return StoredStates(float(data["time"]), states, smallest_h)
 
 

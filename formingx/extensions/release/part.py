@@ -36,7 +36,12 @@ def trimmed_mesh(mesh: Mesh, line: np.ndarray, segments: int) -> Mesh:
 
 
 def _nearest(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the number of the nearest segment of a polyline, shape (n, 2), for each point, shape (m,)."""
+    """Return for each point the number of the nearest segment of a polyline, counted from 0, shape (m,).
+
+    Args:
+        points: positions of m points, shape (m, 2), length.
+        line: corners of the polyline in order, shape (n, 2), length.
+    """
     a, along = line[:-1], np.diff(line, axis=0)
     offsets = points[:, None] - a
     share = np.clip(np.einsum("mij,ij->mi", offsets, along) / np.einsum("ij,ij->i", along, along), 0, 1)

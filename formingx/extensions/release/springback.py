@@ -100,7 +100,10 @@ class Springback(KeyNumbers):
 
 
 def _height(wall: Wall) -> float:
-    """Return the largest axial distance of the middle line from the pole, or else its lowest point, length."""
+    """Return the height of a part: the largest axial distance of its middle line from its pole, the point at r = 0.
+
+    The middle line of a part without a pole, such as a ring, is measured from its lowest point.
+    """
     return float(wall.height.max())
 
 
@@ -260,7 +263,13 @@ class _FixedComponent(PinnedNode):
 
 
 def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
-    """Return the mesh up to the line of nodes nearest to a trim, and the deformed radius of this end, length."""
+    """Return the mesh up to the line of nodes nearest to a trim, and the deformed radius of this end, length.
+
+    Args:
+        mesh: the mesh of the whole body.
+        wall: wall of the body in its tools.
+        trim: radius r, or ("height", h), at which the part ends, length; None: the whole body.
+    """
     strips = float(strips_within(wall, trim).sum())                               # an edge has two strips
     last = int(np.clip(round(strips / 2), 1, (len(wall.r) - 1) // 2))
     middle = (wall.profile.reference_bottom + wall.profile.reference_top)[::2] / 2

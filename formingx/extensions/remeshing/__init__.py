@@ -11,7 +11,12 @@ from .remeshing import Remesh
 
 
 def _load(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
-    """Return the problem of a checkpoint on a mesh that was made during the run; `data` is the result of `files.save`.
+    """Return the problem on the next mesh of a remeshed run, from a checkpoint.
+
+    Args:
+        problem: the problem on the previous mesh.
+        last: the last state on the previous mesh.
+        data: data of the next mesh in the checkpoint, the result of `files.save`.
     """
     return files.load((problem, last), data, Preformed)
 

@@ -60,11 +60,9 @@ class ContactState(NamedTuple):
         return cls(x, d, touches, traction, pairs, slip)
 
     def outward_motion(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """Return the distances by which points of a new mesh must move out of the tool.
+        """Return the distances by which points of a new mesh must move out of the tool, to the depth of the old face.
 
-        They then have the same penetration as the old face beside them.
-
-        Between two old points in contact the depth is interpolated. Elsewhere points in the tool move to its surface,
+        Between two old points in contact this depth is interpolated. Elsewhere points in the tool move to its surface,
         or to the depth of an old neighbour in contact.
 
         Args:
@@ -72,7 +70,8 @@ class ContactState(NamedTuple):
             d: signed distances of the new points from the tool, positive inside, shape (n,), length.
 
         Returns:
-            Distances against the normal that points into the tool, shape (n,), length; negative: into the tool.
+            Distances along the outward normal of the tool, shape (n,), length. A negative distance is a motion into
+            the tool.
         """
         pair, share = self._nearest_pairs(x)
         both = self.touches[pair]

@@ -63,7 +63,10 @@ def original_positions(preformed: Any, points: np.ndarray) -> np.ndarray:
 
 
 def scene_on_new_mesh(mesh: Any, preformed: Any) -> Any:
-    """Return the scene of the old mesh on a new mesh of the deformed body, with the last temperature.
+    """Return a scene on a new mesh of the deformed body, with the items of the scene on the old mesh.
+
+    The old scene is the scene of `Preformed.before`. Its materials, loads, supports and contacts are kept. The last
+    temperature on the old mesh becomes the initial one.
 
     Args:
         mesh: the new mesh.

@@ -50,9 +50,10 @@ class Preformed(NamedTuple):
     Attributes:
         x: present positions of corners, midpoints and centres of the cells, shape (m, 7, 2), length.
         reference: positions of these points in the reference configuration of the old mesh, shape (m, 7, 2), length.
-        b: b = F F^T/J at the start of the old mesh, at corners and midpoints, shape (m, 6, 6). The six entries are rr,
-            rz, zz and hoop entry of b, and cosine and sine of the rotation of F in the section.
-        pressures: pressure fields at the corners, shape (m, 3, fields), dimensionless.
+        b: deformation from the start of the run to the time when the old mesh was made, as b = F F^T/J with J = det F.
+            Shape (m, 6, 6): six entries at the corners and midpoints of each cell. The entries are rr, rz, zz and hoop
+            entry of b, then cosine and sine of the rotation of F in the section.
+        pressures: pressure unknowns of the model at the corners, shape (m, 3, p), dimensionless; p is their number.
         volume_stiffness: additional volume stiffness (`Model.volume_stiffness` times shear modulus) over the unit of
             stress of the problem.
         before: the problem on the old mesh and its last state.
@@ -67,7 +68,7 @@ class Preformed(NamedTuple):
 
     @classmethod
     def of(cls, problem: Any, state: Any) -> Preformed:
-        """Return the transfer data of the body in a state.
+        """Return the positions, deformations and pressures of the body in a state, for a new mesh of it.
 
         Args:
             problem: the `Problem` on the old mesh.
@@ -171,9 +172,15 @@ class Preformed(NamedTuple):
         return x
 
     def _projected_fields(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return `b` and `pressures`, projected onto the cells of the new mesh by least squares in each cell.
+        """Return the deformation and the pressures of the body in the cells of the new mesh, by least squares in each.
 
-        forms: the `Formulation` on the new mesh. Shapes of the results: (cells, 6, 6) and (cells, 3, fields).
+        Returns:
+            Deformation b = F F^T/J from the start of the run to the new mesh, at corners and midpoints, shape (cells,
+            6, 6). The last axis has rr, rz, zz and hoop entry of b, then cosine and sine of the rotation of F. Pressure
+            unknowns of the model at the corners, shape (cells, 3, p), dimensionless.
+
+        Args:
+            forms: the `Formulation` on the new mesh.
         """
         rule: Any = basix.make_quadrature(basix.CellType.triangle, _QUADRATURE_DEGREE)
         xi, weights = rule
@@ -188,7 +195,10 @@ class Preformed(NamedTuple):
         weights = sampled[..., -1] * weights
 
         def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-            """Return nodal values that fit values at points, shape (cells, points, k); shapes: functions there."""
+            """Return the nodal values that fit values at quadrature points best, shape (cells, nodes, k).
+
+            values: shape (cells, points, k). shapes: shape functions of the nodes at the points, shape (points, nodes).
+            """
             mass = np.einsum("cq,qi,qj->cij", weights, shapes, shapes)
             return np.linalg.solve(mass, np.einsum("cq,qi,cqk->cik", weights, shapes, values))
         mean = np.einsum("cq,cqk->ck", weights, b) / weights.sum(1)[:, None]
@@ -260,14 +270,15 @@ def _left_stretch(rr: Any, rz: Any, zz: Any, along: Any, turned: Any,
                   sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
     """Return the left stretch V in the section (V^2 = b), cosine and sine of the rotation of F, and det V.
 
-    The first five arguments are the entries of `Preformed.b` without the hoop entry.
+    The deformation gradient in the section is F = V R, with a rotation R. Interpolated cosines and sines are no longer
+    of length 1, so they are divided by their length.
 
     Args:
-        rr: entry of b.
-        rz: entry of b.
-        zz: entry of b.
-        along: cosine of the rotation times a factor.
-        turned: sine of the rotation times the same factor.
+        rr: entry rr of b.
+        rz: entry rz of b.
+        zz: entry zz of b.
+        along: interpolated cosine of the angle of R.
+        turned: interpolated sine of this angle.
         sqrt: square root for numbers or for UFL.
     """
     area = sqrt(rr * zz - rz * rz)
@@ -277,13 +288,14 @@ def _left_stretch(rr: Any, rz: Any, zz: Any, along: Any, turned: Any,
 
 
 def _positive_definite(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Return quadratic fields of the six entries of `Preformed.b` that are positive definite everywhere in their cells.
+    """Return quadratic fields of the deformation b = F F^T/J that are positive definite everywhere in their cells.
 
     A rapid rotation within an element, as beside a corner, can make them indefinite. Such fields are moved towards
     their means as far as needed.
 
     Args:
-        b: coefficients of the fields, shape (cells, 6, 6).
+        b: nodal values of the fields, shape (cells, 6 nodes, 6 entries). The entries are rr, rz, zz and hoop entry of
+            b, then cosine and sine of the rotation of F.
         mean: mean values of the six entries, shape (cells, 6).
     """
     mean = mean[:, None]

@@ -228,15 +228,16 @@ def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
 
 
 def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
-    """Return the segment on a new mesh of the last body of a path, and the first state on it.
+    """Return a new segment of a path: a new mesh of the body in its last state, and the equilibrium on it.
 
-    Several sizes near the requested one are tried. The first mesh whose J is far from its limits is taken, or else the
-    one whose J is furthest from them.
+    A segment of a path has the states on one mesh. Several element sizes near the requested one are tried. The first
+    mesh on which J is far from the limits `Remesh.volume_ratio` is taken. If there is none, the mesh on which J is
+    furthest from them is taken. J is the determinant of the deformation gradient from the new mesh.
 
     Args:
         path: the path.
         remesh: criterion and sizes.
-        tolerances: tolerances of the state.
+        tolerances: tolerances of Newton's method for the equilibrium on the new mesh.
 
     Raises:
         ConvergenceError: no mesh has an equilibrium.
@@ -269,7 +270,11 @@ def _volume_ratios(record: Record, state: State) -> tuple[float, float]:
 
 
 def _check_mesh(record: Record, state: State, remesh: Remesh) -> None:
-    """End the run if J leaves its range in a new state; store jumps of force and energy in a state of kind "remesh".
+    """End the run on the present mesh if its elements are too distorted in a new state, so that it is remeshed.
+
+    They are too distorted if J, the volume ratio since the mesh was made, leaves `Remesh.volume_ratio`. In the first
+    state on a new mesh (kind "remesh") the relative changes of force and strain energy by the new mesh are stored
+    instead, in `State.jump`.
 
     Args:
         record: record of the run.
@@ -288,7 +293,7 @@ def _check_mesh(record: Record, state: State, remesh: Remesh) -> None:
 
 
 def _needs_remeshing(record: Record, state: State, remesh: Remesh) -> bool:
-    """Return True if J leaves its range in a state that is not the first on its mesh."""
+    """Return True if the volume ratio J leaves `Remesh.volume_ratio` in a state that is not the first on its mesh."""
     if state.kind in ("start", "remesh"):
         return False
     low, high = _volume_ratios(record, state)
@@ -296,12 +301,12 @@ def _needs_remeshing(record: Record, state: State, remesh: Remesh) -> bool:
 
 
 def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
-    """Return the segment on a new mesh of the last body, and the equilibrium on it.
+    """Return a new segment of a path: a new mesh of the body in its last state, and the equilibrium on it.
 
     Args:
         path: the path.
         remesh: criterion and sizes.
-        tolerances: tolerances of the states.
+        tolerances: tolerances of Newton's method for the equilibrium on the new mesh.
         share: element size over the requested size.
     """
     record, old, state = path.record, path.problem, path.last

@@ -89,16 +89,17 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 
 
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
-    """Return the pairs of triangles at a common edge between which lies solid, as indices of `triangles`, shape (2,).
+    """Return the pairs of triangles at a common edge with solid between them, as row numbers of `triangles`, (2,) each.
 
-    The triangles are sorted by their angle about the edge, counter-clockwise seen against its direction from edge[0] to
-    edge[1]. A wedge of solid begins at a triangle that contains the reversed edge. It ends at the next triangle that
-    contains the edge forward. Where a wedge ends and another begins at the same angle, the end comes first.
+    The vertices of each triangle run counter-clockwise seen from outside the solid. On a way around the edge, solid
+    therefore begins at a triangle that runs along the edge from edge[1] to edge[0]. It ends at the next triangle that
+    runs from edge[0] to edge[1]. The way is counter-clockwise, seen from edge[1] towards edge[0]. At equal angles an
+    end comes before a beginning.
 
     Args:
         points: vertices, shape (n, 3), length.
         triangles: vertex numbers of the m triangles at the edge, shape (m, 3).
-        directed: vertex numbers of the edge in the order of each triangle, shape (m, 2).
+        directed: the two vertex numbers of the edge in the order in which each triangle runs along it, shape (m, 2).
         edge: vertex numbers of the edge in ascending order, shape (2,).
     """
     forward = directed[:, 0] == edge[0]

@@ -1,7 +1,7 @@
 """Sliding contact in three dimensions, with or without friction, in which points open and close only between steps.
 
-A point whose gap closed in a step is in contact from the next step on (as in `lagged_stick`), and then stays on the
-surface of the tool. Its traction per unit reference area is
+Contact is lagged: a point whose gap closed in a step is in contact from the next step on, and then stays on the surface
+of the tool. Its traction per unit reference area is
 
 .. math:: t = k d n + T, \\qquad T = \\frac{\\mu N_0}{g_s} g, \\quad |g| \\le g_s,
 
@@ -50,10 +50,14 @@ class Distances(NamedTuple):
 class LaggedFriction(LaggedStick):
     """Contact law of points that slide on a tool in three dimensions, with lagged friction or without friction.
 
-    The equations are stated in the module. The history variables (`ContactHistory`) have these meanings. `position` is
-    the position at the last accepted state, and `slip` the elastic slip there, shape (n, 3), length. For a point in
-    contact `distance` is the pressure at this state over the penalty k. `closure` is a position at the depth N_0/k in
-    the tool, with the pressure N_0 that limits friction.
+    Friction is lagged: its limit mu N_0 is constant during a step. N_0 is the pressure at the last accepted state,
+    extrapolated. The module states the equations. The law uses the history variables (`ContactHistory`) of n points
+    in this way:
+
+    * `position`: positions at the last accepted state, shape (n, 3), length.
+    * `slip`: elastic slip at this state, shape (n, 3), length.
+    * `distance`: of a point in contact, its depth in the tool at this state; times the penalty k it is the pressure.
+    * `closure`: positions that store N_0: their depth in the tool is N_0/k, shape (n, 3), length.
 
     Args:
         tool: tool with a method `distances` (see `Distances`).
@@ -120,8 +124,8 @@ class LaggedFriction(LaggedStick):
     def pressure_ahead(self, old: ContactHistory) -> np.ndarray:
         """Return the contact pressure N_0 that limits friction during the next step, in which it is constant.
 
-        It is the penalty times the depth of `ContactHistory.closure`, at most 10 times above or below the last
-        pressure.
+        The positions `ContactHistory.closure` store it: N_0 is the penalty times their depth in the tool. It is at most
+        10 times larger or smaller than the pressure at the last accepted state.
 
         Args:
             old: history variables of the last accepted state.
@@ -137,12 +141,15 @@ class LaggedFriction(LaggedStick):
             self._ahead = old, self.k * np.clip(depth, now / _MAX_PRESSURE_RATIO, _MAX_PRESSURE_RATIO * now)
         return self._ahead[1]
 
-    def at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
-        """Return the positions `ContactHistory.closure` for which `pressure_ahead` returns a given pressure.
+    def closure_at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
+        """Return the positions, to be stored as `ContactHistory.closure`, whose depth in the tool encodes a pressure.
+
+        Their depth is the pressure over the penalty, to first order. `pressure_ahead` then limits friction by this
+        pressure.
 
         Args:
             old: history variables of the last accepted state.
-            pressure: pressure N_0 of each point, shape (n,), stress.
+            pressure: pressure of each of the n points, shape (n,), stress.
 
         Returns:
             Positions relative to the tool, shape (n, 3), length.
@@ -195,7 +202,7 @@ class LaggedFriction(LaggedStick):
             return found
 
         def history() -> ContactHistory:
-            """Return the history variables of the n points if the state at x is accepted."""
+            """Return the history variables that the n points have once the state at x is accepted."""
             slip = np.zeros_like(x)
             slip[rows] = np.where(slides[:, None], self.elastic_slip * _SLIDES_ON * way, g)
             depth = self.distance(x)

@@ -81,8 +81,9 @@ class LaggedStick(ContactLaw):
     def in_tension(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
         """Return the mask of the sticking points in tension, which separate at the end of a step.
 
-        A point is in tension if its distance outside the tool exceeds 0.01 of its distance from the sticking position,
-        and 0.001 theta. Without `separates` no point is in the mask.
+        A point outside the tool is in tension if its distance from the tool exceeds two limits. One is 0.01 times its
+        distance from the position where it sticks. The other is 0.001 theta: theta is the distance from the tool below
+        which a point touches it. If sticking points cannot separate (`separates` is False), no point is in the mask.
 
         Args:
             x: positions relative to the tool, shape (n, 3), length.
@@ -156,7 +157,9 @@ class LaggedStick(ContactLaw):
         return Tractions(force, sticking.astype(float), zero, zero, stiffness, lambda: self._history(x, old, sticking))
 
     def _history(self, x: np.ndarray, old: ContactHistory, sticking: np.ndarray) -> ContactHistory:
-        """Return the history variables if a state at x is accepted; points that closed stick where they met the tool.
+        """Return the history variables that the points have once the state at x is accepted.
+
+        A point whose gap closed in the step sticks where its straight path from the state before enters the tool.
 
         Args:
             x: positions relative to the tool, shape (n, 3), length.

@@ -29,7 +29,7 @@ class Sheet(Mesh):
 
     Each layer covers the whole sheet. Besides the boundaries of its outline a sheet has the faces "bottom" and "top"
     (towards +z). A membrane has one surface only, so the face on which a pressure acts determines the direction of the
-    pressure. As boundaries of the mesh both faces contain all edges.
+    pressure. The boundary "bottom" and the boundary "top" of the mesh each contain all edges of the triangles.
 
     Attributes:
         of_size: function that meshes the same sheet again; its argument is the edge length of the triangles, a number

@@ -97,7 +97,10 @@ class SolidTool:
         return LaggedFriction(self, contact.mu, k, theta, contact.elastic_slip * thickness)
 
     def _distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distances of points x, shape (n, 3), from the unmoved tool, shape (n,), length."""
+        """Return the signed distances of points from the unmoved tool, positive inside the tool, shape (n,), length.
+
+        x: positions, shape (n, 3), length.
+        """
         raise NotImplementedError
 
     def _surface(self) -> tuple[np.ndarray, np.ndarray]:
@@ -152,7 +155,10 @@ class Swept(SolidTool):
         return Distances(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
 
     def _distance(self, x):
-        """Return the signed distances of points x, shape (n, 3), from the unmoved tool, shape (n,), length."""
+        """Return the signed distances of points from the unmoved tool, positive inside the tool, shape (n,), length.
+
+        x: positions, shape (n, 3), length.
+        """
         return self.profile.signed_distance(np.column_stack([self._profile_coordinate(x)[0], x[:, 2]]))
 
     def _profile_coordinate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

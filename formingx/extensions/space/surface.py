@@ -162,7 +162,10 @@ class Surface(Formulation):
 
 
 class _AlwaysAdmissible:
-    """Check of the volume ratio in place of `Admissible`, which every state passes: a membrane has J > 0."""
+    """Check of the volume ratio that every state passes, for membranes, whose volume ratio J is always above 0.
+
+    It takes the place of `Admissible`, the check for solids.
+    """
 
     def holds(self) -> bool:
         """Return True: the volume ratio of a membrane is positive in every state."""

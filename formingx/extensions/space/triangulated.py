@@ -39,7 +39,10 @@ class Triangulated(SolidTool):
         self.middle = points.mean(0)
 
     def _distance(self, x):
-        """Return the signed distances of points x, shape (n, 3), from the unmoved tool, shape (n,), length."""
+        """Return the signed distances of points from the unmoved tool, positive inside the tool, shape (n,), length.
+
+        x: positions, shape (n, 3), length.
+        """
         from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
         from vtkmodules.vtkCommonCore import vtkDoubleArray
         if not self._implicit:

@@ -90,7 +90,13 @@ class SheetWall(ColumnTable):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the written file, with a row for each triangle: {name: values, shape (m,)}."""
+        """Columns of the table that `to_csv` writes, with a row for each triangle: {name: values, shape (m,)}.
+
+        X, Y and x, y, z are the reference and deformed positions of the centroid, length, and `area` is the deformed
+        area. `wall` is the deformed thickness, length; `wall_ratio` is `wall` over the reference thickness. `stretch_1`
+        and `stretch_2` are the larger and the smaller principal stretch. `wrinkled` is 1 in compression, else 0. A
+        sheet of several layers also has `wall_of_` with the name of each, the deformed thickness of this layer, length.
+        """
         X, x = self.reference_points[self.triangles].mean(1), self.middle
         each = {f"wall_of_{name}": h * self.ratio for name, h in self.layers.items()}
         return {"X": X[:, 0], "Y": X[:, 1], "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,
@@ -98,7 +104,7 @@ class SheetWall(ColumnTable):
                 "stretch_2": self.stretches[:, 1], "wrinkled": self.wrinkled.astype(float),
                 **(each if len(each) > 1 else {})}
 
-    def at(self, x: float, y: float) -> float:
+    def thickness_at(self, x: float, y: float) -> float:
         """Return the wall thickness at the node nearest to a position on the flat sheet.
 
         Args:
@@ -108,7 +114,7 @@ class SheetWall(ColumnTable):
         Returns:
             Deformed wall thickness, length.
         """
-        away = np.hypot(*(self.reference_points[:, :COORDINATES] - pair("at", (x, y))).T)
+        away = np.hypot(*(self.reference_points[:, :COORDINATES] - pair("thickness_at", (x, y))).T)
         return float(self.at_nodes[np.argmin(away)])
 
     def around(self, point: tuple[float, float, float], radius: float) -> float:

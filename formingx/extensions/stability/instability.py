@@ -209,7 +209,7 @@ class StabilityAnalysis:
         """Return the object that computes the modes on the mesh of a segment, created at the first call.
 
         Args:
-            segment: the part of the path on one mesh.
+            segment: the `Segment`, the part of the path on one mesh.
 
         Returns:
             The `Modes`.
@@ -280,9 +280,11 @@ class StabilityAnalysis:
         return [self._critical_point(segment, entry, limit) for entry, limit in zip(found, limits, strict=True)]
 
     def _is_limit_point(self, segment: Any, found: LocatedPoint) -> bool:
-        """Return True if the mode of a located point is nearly parallel to the tangent of the path: a limit point."""
-        x, direction = found.x, found.left.direction
-        problem = segment.problem
+        """Return True if a point is a limit point: if its mode is nearly parallel to the tangent of the path.
+
+        segment: the `Segment`, the part of the path on one mesh.
+        """
+        x, direction, problem = found.x, found.left.direction, segment.problem
         a, b = problem.x.duplicate(), problem.x.duplicate()
         a.array_w[:], b.array_w[:] = x, direction
         cosine = abs(problem.inner(a, b)) / np.sqrt(problem.inner(a, a) * problem.inner(b, b))
@@ -294,7 +296,7 @@ class StabilityAnalysis:
         """Return the `CriticalPoint` of a located point, with the mode at the nodes of all ranks.
 
         Args:
-            segment: the part of the path on one mesh.
+            segment: the `Segment`, the part of the path on one mesh.
             found: the located point.
             limit: True for a limit point.
         """

@@ -225,21 +225,31 @@ class Modes:
             return _ModesOfState(fraction, state, count, *self._lanczos(4 + abs(count - index)))
 
     def _mode_of_index(self, sample: _ModesOfState, index: int) -> Array:
-        """Return the mode of eigenvalue number `index` (ascending, from 0) of a state, or the nearest one known.
+        """Return the mode of eigenvalue number `index` of a state, counted in ascending order from 0.
 
-        sample: eigenvalues and modes of the state.
+        Only modes with eigenvalues near 0 are known. If this one is not, the known mode with the nearest number is
+        returned.
+
+        Args:
+            sample: known eigenvalues and modes of the state, and its number of negative eigenvalues.
+            index: number of the eigenvalue.
         """
         negative = np.flatnonzero(sample.values < 0)
         k = (negative[-1] + 1 if len(negative) else 0) + index - sample.unstable
         return sample.modes[min(max(k, 0), len(sample.modes) - 1)]
 
     def _track(self, samples: list[_ModesOfState], end: _ModesOfState, index: int) -> list[tuple[float, float]]:
-        """Return (fraction, eigenvalue) of one mode in all sampled states in which a mode has nearly the same shape.
+        """Return the eigenvalue of one mode in several states between two states of a path.
+
+        A state in which no known mode has nearly the shape of this mode is left out.
 
         Args:
-            samples: eigenvalues and modes of the ends of the step and of states in between.
-            end: the end of the bracket at which the mode is unstable.
-            index: number of the eigenvalue there, in ascending order.
+            samples: eigenvalues and modes of the two states and of states in between.
+            end: the state of the samples next to the critical point in which the mode is unstable.
+            index: number of the eigenvalue of the mode in this state, in ascending order from 0.
+
+        Returns:
+            List of (fraction, eigenvalue), where the fraction is the position of a state between the two, 0 to 1.
         """
         mode, found = self._mode_of_index(end, index), []
         for sample in samples:

@@ -186,7 +186,10 @@ class SecondVariation:
         return [mode / np.sqrt(self._sum(mode * mode)) for mode in free if self._moves_freely(mode)]
 
     def _moves_freely(self, mode: np.ndarray) -> bool:
-        """Return True if a rigid motion (a mode, locally owned entries) causes no force in `matrix`."""
+        """Return True if a rigid motion causes no force: if its product with the second variation `matrix` is 0.
+
+        mode: the rigid motion, locally owned entries, shape (n,).
+        """
         x, y, diagonal = self.matrix.createVecRight(), self.matrix.createVecRight(), self.matrix.getDiagonal()
         x.array_w[:] = mode
         self.matrix.mult(x, y)
@@ -198,9 +201,10 @@ class SecondVariation:
         return bool(forces < _FREE_MOTION_FORCE * single)
 
     def _constrain_rigid(self) -> None:
-        """Constrain in `matrix` the unknown with the largest entry of each free rigid motion.
+        """Constrain one unknown in `matrix` for each rigid motion that supports and contacts leave free.
 
-        Before, Gaussian elimination removes the constrained unknowns of earlier motions from it.
+        It is the unknown in which the motion is largest. Before it is chosen, multiples of the earlier motions are
+        subtracted from the motion, so that it vanishes in the unknowns that are constrained already.
         """
         first, remaining = self.matrix.getOwnershipRange()[0], [mode.copy() for mode in self.rigid_motions]
         rows = []
@@ -255,7 +259,10 @@ class SecondVariation:
         return form
 
     def _number_unknowns(self) -> None:
-        """Set the nodes, their unknowns (U, W, V), and the map from unknowns of the problem to unknowns of a mode."""
+        """Set the nodes, their unknowns, and the map from unknowns of the problem to unknowns of a mode.
+
+        The unknowns of a node are the amplitudes U, W and V of its radial, axial and hoop displacement.
+        """
         forms, problem = self._forms, self.problem
         index_map, old, new = self.space.dofmap.index_map, forms.space, self.space
         self._owned, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
@@ -301,7 +308,8 @@ class SecondVariation:
         """Return the local numbers of the unknowns that a support constrains, with ghosts.
 
         Args:
-            component: 0, 1, 2 for U, W, V + m U.
+            component: 0 for the radial amplitude U, 1 for the axial amplitude W, 2 for the third unknown. It is the
+                hoop amplitude V, or V + U for modes of one wave round the axis.
             item: the `Constrained` boundary or point.
         """
         space, forms = self.space.sub(0).sub(component), self._forms
@@ -347,11 +355,15 @@ class SecondVariation:
         return np.flatnonzero(marks).astype(np.int32)
 
     def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Yield (number of the item in the scene, row, correction) for each constraint of a mean displacement.
+        """Yield the row of each constraint of a mean displacement of modes, and what it becomes for one wave.
 
-        The row for modes of circumferential wave number n is row - m correction, with m = 1 for n = 1 and 0 else. Both
-        have the shape (locally owned unknowns,). A support that constrains both mean components also constrains the
-        mean hoop displacement.
+        A support that constrains the mean radial and axial displacement also constrains the mean hoop displacement V.
+        The third unknown is V, but V + U for modes of one wave round the axis, with the radial displacement U. For one
+        wave U is therefore subtracted from the row of the hoop displacement.
+
+        Yields:
+            Number of the support among the items of the scene; row of the constraint; row to be subtracted from it for
+            one wave. Both have the shape (locally owned unknowns,). The second is 0 for radial and axial displacements.
         """
         forms, problem = self._forms, self.problem
         n = problem.n_owned
@@ -370,10 +382,12 @@ class SecondVariation:
     def _contact_stiffness(self, contact: Any, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the unknowns, shape (n, k), and stiffness matrices, shape (n, k, k), of the n points of a contact.
 
+        The k unknowns of a point are the radial and axial amplitudes U, W of its nodes, then their third unknowns.
+
         Args:
             contact: the contact face of the problem.
             fields: locally owned unknowns of the problem.
-            m: 1 for modes of one wave round the axis, whose third unknown is V + U; else 0.
+            m: 1 for modes of one wave round the axis, else 0. The third unknown is V + m U with the hoop amplitude V.
         """
         control = self.problem.control
         plane = contact.stiffness(fields, control)
@@ -388,14 +402,17 @@ class SecondVariation:
         return np.column_stack([dofs, self._V_of[dofs[:, ::2]]]), values
 
     def _guided_stiffness(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return unknowns, shape (n, 3), and stiffness, shape (n, 3, 3), of nodes that are fixed in r alone.
+        """Return the stiffness added by the support forces of n nodes that are fixed in r, but free round the axis.
 
-        The outward force f on such a node acts along a circle: its second variation by a hoop displacement V is -f
-        V^2/r.
+        Such a node moves along a circle about the axis. A hoop displacement V therefore moves it inwards by V^2/(2 r),
+        against the outward force f of the support. The second variation of the energy by V is -f V^2/r.
 
         Args:
             fields: locally owned unknowns of the problem.
-            m: 1 for modes of one wave round the axis, whose third unknown is V + U; else 0.
+            m: 1 for modes of one wave round the axis, else 0. The third unknown is V + m U with the radial amplitude U.
+
+        Returns:
+            Unknowns of the nodes (radial, axial, third), shape (n, 3); stiffness matrices, shape (n, 3, 3).
         """
         r = self._X[:, 0] + self._forms.length * fields[self._old[:, 0]]
         constrained = np.zeros(len(self._V_of), dtype=bool)

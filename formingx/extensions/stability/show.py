@@ -27,9 +27,16 @@ def draw(point: Any, file: Any, scale: float) -> None:
 
 
 def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return (deformed positions, shape (m, 2), length; mode (U, W, V), shape (m, 3)) of m points on each boundary.
+    """Return the deformed outline of a body, boundary by boundary, and the buckling mode along it; collective.
 
-    The axis of an axisymmetric body is left out. Collective.
+    The axis of an axisymmetric body is left out.
+
+    Args:
+        point: the `CriticalPoint` with the mode.
+
+    Returns:
+        For each boundary with m points: deformed positions, shape (m, 2), length; amplitudes U, W, V of the radial,
+        axial and hoop displacement of the mode, shape (m, 3), dimensionless.
     """
     path, state = point.path, point.state
     segment = path.segment(point.left)

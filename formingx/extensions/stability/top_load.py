@@ -99,7 +99,10 @@ class TopLoad:
 
     @property
     def energy(self) -> float:
-        """Work of the force on the neck up to the first buckling, or else the largest force; force times length."""
+        """Work of the force on the neck up to the first buckling, force times length.
+
+        If no mode buckles, it is the work up to the state with the largest force.
+        """
         first = self.first
         end = self.travel_at_largest_force if first is None else -first.control
         last = int(np.argmax(self.travel >= end * (1 - 1e-12)))
@@ -134,8 +137,9 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
              step: StepControl | None = None, units: Units | None = None) -> TopLoad:
     """Press a stress-free body down onto a frictionless plate by its neck, and find its buckling loads.
 
-    The neck is constrained radially and round the axis. The contact compliance is about a thousandth of the wall, so
-    that the standing ring of a bottle rolls.
+    The neck is constrained radially and round the axis. The plate is slightly compliant: the foot sinks into it by
+    about a thousandth of the wall. So the contact of the standing ring of a bottle can roll along the plate, while on a
+    rigid plate it would hop from point to point.
 
     Args:
         body: mesh of the body, for example `Path.deformed_mesh()`.
@@ -145,7 +149,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
         modes: circumferential wave numbers to examine.
         neck: name of the boundary that is pressed down.
         foot: name of the boundary that stands on the plate.
-        step: control of the step length; default `StepControl(largest=0.004)`.
+        step: control of the step length; default `StepControl(largest=0.004)`, a dimensionless arc length.
         units: a `formingx.Units`, for the labels.
 
     Returns:

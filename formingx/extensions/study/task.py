@@ -50,7 +50,10 @@ class Task(NamedTuple):
     measure: dict[str, Measure]
 
     def __call__(self, values: dict[str, float]) -> StudyRun:
-        """Run `build` with values {variable: value}; return its measures, or the reason for its failure."""
+        """Run `build` with values of the variables; return its measures, or the reason for its failure.
+
+        values: {variable of the study: its value in this run}.
+        """
         began, log, log_filter = time.perf_counter(), logging.getLogger("formingx"), _RunLogFilter(values)
         log.addFilter(log_filter)
         try:
@@ -66,10 +69,10 @@ class Task(NamedTuple):
 
 
 class _RunLogFilter(logging.Filter):
-    """Log filter that adds the values of a run to its log records and collects its warnings; for one thread.
+    """Log filter that adds the variables of a run to its log records and collects its warnings; for one thread.
 
     Args:
-        values: {variable: value} of the run.
+        values: {variable of the study: its value in this run}.
     """
 
     def __init__(self, values: dict[str, float]):
@@ -77,7 +80,7 @@ class _RunLogFilter(logging.Filter):
         self._values, self._thread, self.warnings = values, threading.get_ident(), list[str]()
 
     def filter(self, record: logging.LogRecord) -> bool:
-        """Prefix a record of this thread with the values of the run; return True, so that it is logged."""
+        """Prefix a record of this thread with the run's values of the study's variables; return True: it is logged."""
         if record.thread == self._thread:
             text = record.getMessage()
             record.msg, record.args = f"run {as_text(self._values)}: {text}", ()
