@@ -174,7 +174,10 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
 
 
 def _columns(path: Any) -> list[str]:
-    """Return the names of the columns with reference positions, then displacements, such as R, Z, u_r, u_z."""
+    """Return the names of columns with reference positions and displacements in a run, such as R, Z, u_r, u_z.
+
+    path: the `Path` of the run.
+    """
     axes = path.problem.scene.kinematics.axes
     return [*_COORDINATES_OF[len(axes)], *(f"u_{axis}" for axis in axes)]
 

@@ -251,5 +251,8 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
 
 
 def _norm(problem: Any, x: np.ndarray) -> float:
-    """Return the Euclidean norm, over all ranks, of the vector with the locally owned entries x, shape (n,)."""
+    """Return the Euclidean norm over all ranks of a vector.
+
+    problem: the `Problem`, for its ranks. x: locally owned entries of the vector, shape (n,).
+    """
     return float(np.sqrt(problem.comm.allreduce(float(x @ x))))

@@ -132,7 +132,10 @@ def _write(file: Any, title: str, summary: list[str], cards: list, notes: list, 
 
 
 def _sections(runs: list[Any], names: list[str], units: Units) -> str:
-    """Return an HTML figure of the sections of several runs side by side, coloured by the wall thickness."""
+    """Return an HTML figure of the sections of several runs side by side, coloured by the wall thickness.
+
+    runs: `DesignRun` objects. names: titles of their panels. units: units of the labels.
+    """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -222,7 +225,10 @@ def _profiles(before: Any, best: Any) -> str:
 
 
 def _heat_map(effects: Any, units: Units) -> str:
-    """Return an HTML figure, a heat map of the effects of all parameters on the wall."""
+    """Return an HTML figure: a heat map of the derivatives of the wall by all parameters.
+
+    effects: the derivatives, an `Effects`. units: units of the labels.
+    """
     drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
     effects.plot(axes)
     return "<h2>What changes the wall, and where</h2>" + page.figure(

@@ -237,9 +237,14 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
         raise InputError(f"fit: {len(measured)} points cannot fix the {n} constants of {type(guesses[0]).__name__}")
 
     def refined(guess: Material, start: Any, evaluations: int) -> tuple[float, Material, np.ndarray]:
-        """Return (cost, guess, its fitted coordinates) after a least-squares fit with at most this many evaluations.
+        """Return (cost, guess, fitted coordinates of the constants) after a least-squares fit.
 
         The cost is infinite if the stress of the guess is not finite at some stretch.
+
+        Args:
+            guess: material whose class and coordinates are fitted.
+            start: coordinates of the constants from which the fit starts, shape (constants,).
+            evaluations: largest number of evaluations of the stresses.
         """
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 

@@ -281,9 +281,14 @@ def _fit_branches(data: _TimedData, material: RelaxingMaterial, n: int) -> tuple
 
 
 def _guesses(data: _TimedData, material: RelaxingMaterial, n: int) -> list[RelaxingMaterial]:
-    """Return materials with n branches from which a fit starts; for the arguments see `_fit_branches`.
+    """Return materials with n branches from which a fit starts.
 
     Two are made from the spectrum that fits best. The given material is the third if it has n branches.
+
+    Args:
+        data: measured stresses of the tests, and stresses of single branches at the same points.
+        material: material whose class and equilibrium part are used.
+        n: number of branches.
     """
     from scipy.optimize import nnls
     equilibrium = material.equilibrium

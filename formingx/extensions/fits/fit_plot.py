@@ -96,5 +96,5 @@ def _draw_timed(material: Any, tests: Any, constant: list[bool], panels: Any) ->
 
 
 def _rate(times: np.ndarray, stretches: np.ndarray) -> str:
-    """Return the mean Hencky rate of a test as text, for a legend."""
+    """Return the mean Hencky rate of a test as text, for a legend; from its times and stretches, shape (n,) each."""
     return f"rate {abs(np.log(stretches[-1] / stretches[0])) / (times[-1] - times[0]):.3g}"

@@ -67,7 +67,10 @@ def layers_needed(biot: float) -> int:
 
 
 def _biot_factor(biot: float) -> float:
-    """Return the temperature error of coarse layers at a Biot number over the error at an infinite Biot number."""
+    """Return the temperature error of coarse layers at a Biot number over the error at an infinite Biot number.
+
+    biot: conductance of the chilled face times thickness of the sheet over conductivity.
+    """
     return 1.0 if np.isinf(biot) else biot / (biot + _HALF_ERROR_BIOT)
 
 

@@ -321,7 +321,7 @@ class Conduction(HeatVectors):
                    for m, dx in self._layer_measures(materials))
 
     def _compile(self, materials: Mapping[str, ThermalProperties]) -> None:
-        """Compile the forms of mass, rate and tangent, and create the matrix and its solver."""
+        """Compile the forms of mass, rate and tangent, and create the matrix and its solver; `materials`: by layer."""
         T, v, J = self.T, self._v, self._J
         R = -sum(self._scale * self.constant(m.conductivity) * J * self._weight
                  * ufl.inner(self._gradient(T), self._gradient(v)) * dx for m, dx in self._layer_measures(materials))
@@ -439,7 +439,7 @@ class Conduction(HeatVectors):
             raise ConvergenceError("heat: the matrix of a step is singular")
 
     def _solve(self, rhs: np.ndarray) -> np.ndarray:
-        """Return the solution for a right-hand side with the factorised matrix; locally owned entries, shape (n,)."""
+        """Return the solution for the right-hand side `rhs`, both locally owned entries, with the factorised matrix."""
         self._rhs.array_w[:] = np.where(self._fixed_mask, 0.0, rhs)
         self._solver.solve(self._rhs, self._out)
         return self._out.array_r.copy()

@@ -331,9 +331,12 @@ def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, 
 
 
 def _finer_elements(scene: Any, times: float, duration: float) -> str:
-    """Return advice on element sizes that reduce the temperature error by a factor `times`, or "" if none is known.
+    """Return advice on element sizes that reduce the temperature error, or "" if none is known.
 
-    The error is of third order in the element size. `duration` is the time during which heat has penetrated.
+    Args:
+        scene: the scene whose sheet gets the finer elements.
+        times: present error over the wanted error. The error is of third order in the element size.
+        duration: time during which heat has penetrated.
     """
     laws = {law.on for law in [*scene.heat.boundaries, *scene.heat.contacts_with_tools(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
@@ -345,13 +348,21 @@ def _finer_elements(scene: Any, times: float, duration: float) -> str:
 
 
 def _equal(a: Any, b: Any) -> bool:
-    """Return True if two triples (time, temperatures, None or a pair (earlier time, temperatures)) are equal."""
+    """Return True if two triples a and b (time, temperatures, None or (earlier time, temperatures)) are equal."""
     same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
     return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
 
 
 def _matching_rows(points: np.ndarray, others: Any) -> np.ndarray:
-    """Return the row of `others` that coincides with each point, shape (n,); raise an InputError if there is none."""
+    """Return for each point the number of the row of `others` that coincides with it, shape (n,).
+
+    Args:
+        points: positions of n points, shape (n, coordinates), length.
+        others: stored positions, among which the points are searched, shape (m, coordinates), length.
+
+    Raises:
+        InputError: a point is not among the stored positions.
+    """
     from scipy.spatial import cKDTree
     others = np.reshape(others, (-1, points.shape[-1]))
     if not len(points):

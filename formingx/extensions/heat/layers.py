@@ -140,7 +140,10 @@ def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return edges (pairs of point numbers), shape (n, 2), with the end of smaller R first, at equal R of smaller Z."""
+    """Return edges with the end of smaller R first, at equal R of smaller Z, shape (n, 2).
+
+    points: positions (R, Z), shape (m, 2), length. edges: numbers of the two ends of each edge, shape (n, 2).
+    """
     a, b = points[edges[:, 0]], points[edges[:, 1]]
     swap = (a[:, 0] > b[:, 0]) | (a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1])
     return np.where(swap[:, None], edges[:, ::-1], edges)

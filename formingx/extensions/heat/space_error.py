@@ -74,7 +74,10 @@ class SpaceError:
         return found
 
     def _in_cubic_space(self, own: np.ndarray) -> np.ndarray:
-        """Return the nodal values, in the space of cubic elements, of a quadratic function; locally owned entries."""
+        """Return the nodal values of a function in the space of cubic elements, locally owned entries, shape (k,).
+
+        own: its nodal values in the space of quadratic elements, locally owned entries, shape (n,).
+        """
         self._values.x.array[: len(own)] = own
         self._values.x.scatter_forward()
         self._cubic_values.interpolate(self._values)

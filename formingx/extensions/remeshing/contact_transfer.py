@@ -93,7 +93,14 @@ class ContactState(NamedTuple):
         return found[:, 0], found[:, 1], self.touches[pair].all(1)
 
     def _nearest_pairs(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the nearest pair of neighbours on the old face, shape (n, 2), and the place between them, 0 to 1."""
+        """Return the pair of neighbouring points on the old face between which each of n new points lies.
+
+        Args:
+            x: positions of the new points in the frame of the tool, shape (n, 2), length.
+
+        Returns:
+            Numbers of the two old points, shape (n, 2); position between them, from 0 to 1, shape (n,).
+        """
         a, b = np.moveaxis(self.position[self.pairs], 1, 0)
         offset = x[:, None] - a
         share = np.clip(np.einsum("nmi,mi->nm", offset, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)

@@ -261,7 +261,15 @@ class Preformed(NamedTuple):
 
 
 def _tabulated(element: Any, xi: np.ndarray, derivatives: int = 0) -> np.ndarray:
-    """Return shape functions at n local points, and with `derivatives` = 1 their slopes, shape (1 or 3, n, functions).
+    """Return the shape functions of an element at points of a triangle, and their derivatives if asked for.
+
+    Args:
+        element: the Basix element.
+        xi: local coordinates of the points, shape (n, 2).
+        derivatives: 1 for functions and their two first derivatives, 0 for functions alone.
+
+    Returns:
+        Values, shape (1, n, functions), or (3, n, functions) with derivatives.
     """
     return np.asarray(element.tabulate(derivatives, xi)) if len(xi) else np.zeros((1 + 2 * derivatives, 0, element.dim))
 

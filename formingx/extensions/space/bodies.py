@@ -72,7 +72,11 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
     """Return for each body the indices of its k triangles in `triangles`, shape (k,).
 
     A body is a set of triangles connected by edges. At an edge of more than two triangles, only the two triangles with
-    the solid between them are connected (see `_wedges`).
+    the solid between them are connected.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -116,5 +120,5 @@ def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edg
 
 
 def _overlap(box: np.ndarray, other: np.ndarray) -> bool:
-    """Return True if two bounding boxes overlap, each (lowest, highest) coordinates, shape (2, 3), length."""
+    """Return True if the bounding boxes `box` and `other` overlap: (lowest, highest) corner, shape (2, 3), length."""
     return bool((box[0] <= other[1]).all() and (other[0] <= box[1]).all())

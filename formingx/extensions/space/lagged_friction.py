@@ -265,7 +265,8 @@ class _Tractions(Tractions):
 
 
 def _basis(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return two orthogonal unit vectors in each tangent plane, shape (n, 3) each, for unit normals, shape (n, 3)."""
+    """Return two orthogonal unit vectors in each tangent plane, shape (n, 3) each; normal: unit normals, shape (n, 3).
+    """
     axis = np.eye(3)[np.abs(normal).argmin(1)]
     first = np.cross(axis, normal)
     first /= np.linalg.norm(first, axis=1, keepdims=True)

@@ -102,7 +102,10 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     last, names = (0.0, -b) if part == "half" else (a, 0.0), "rim"
 
     def add_piece(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
-        """Append a straight piece, or an arc about `centre`, from the last point to `point`, unless both coincide."""
+        """Append a straight piece, or an arc about `centre`, from the last point to `point`, unless both coincide.
+
+        name: name of the boundary that the piece belongs to.
+        """
         nonlocal last
         if math.dist(last, point) > 1e-12 * (a + b):
             found.append(Edge(last, point, centre, name))
@@ -209,6 +212,8 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
 def _chords(edges: list[Edge]) -> np.ndarray:
     """Return the corners of an outline with each arc divided into 8 chords, shape (n, 2), length.
 
+    edges: straight and curved pieces of the outline, in order.
+
     Raises:
         InputError: two equal corners in succession, or an outline that crosses or touches itself, for which gmsh might
             not end.
@@ -255,7 +260,10 @@ class _Size:
             raise InputError(f"{where}: the function fails: {type(error).__name__}: {error}") from error
 
     def callback(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
-        """Return the edge length of triangles at a point (x, y), for gmsh; 1e22 where the user's function fails."""
+        """Return the edge length of triangles at a point (x, y), for gmsh; 1e22 where the user's function fails.
+
+        gmsh also gives `dim`, `tag`, `z` and its own `size`, which are not used.
+        """
         try:
             return self(x, y)
         except InputError as error:

@@ -125,6 +125,8 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
 def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
     """Return the corners of the m triangles of an STL file, shape (3 m, 3), and their corner numbers, shape (m, 3).
 
+    name: path of the file.
+
     Raises:
         InputError: the file cannot be read, or is no STL file of a solid.
     """

@@ -259,7 +259,7 @@ class Modes:
         return found
 
     def _between(self, a: State, b: State, fraction: float) -> State:
-        """Solve for the state at a fraction (0 to 1) between two states of the path.
+        """Solve for the state at a fraction (0 to 1) of the way from state a of the path to state b.
 
         Raises:
             Failure: no convergence, or convergence to another branch.
@@ -327,7 +327,7 @@ class Modes:
         return x / np.sqrt(self._inner(x, x))
 
     def _orthogonalised(self, x: Array, others: list[Array]) -> Array:
-        """Return a mode x without its components along other modes, which are orthonormal in the lumped mass."""
+        """Return a mode x without its components along `others`, modes that are orthonormal in the lumped mass."""
         if not others:
             return x
         basis = np.array(others)

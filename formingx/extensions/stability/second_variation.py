@@ -239,7 +239,10 @@ class SecondVariation:
         F, H = forms.elastic_F, forms.elastic(gradient(h))
 
         def changed(within: bool) -> Any:
-            """Return F plus the entries of H in the blocks of F (section, hoop) or outside (UFL, shape (3, 3))."""
+            """Return F plus some entries of the mode's H: in the blocks of F if `within`, else outside (UFL, (3, 3)).
+
+            The blocks are the section and the hoop entry.
+            """
             return ufl.as_tensor([[(F[i, j] if (i, j) in BLOCK else 0) + (H[i, j] if ((i, j) in BLOCK) is within
                                                                             else 0)
                                    for j in range(3)] for i in range(3)])

@@ -113,7 +113,7 @@ class TopLoad:
 
     def __str__(self) -> str:
         def text(value: float, quantity: str, digits: int = 5) -> str:
-            """Return a value with the unit of a quantity, as text."""
+            """Return a value with the unit of a quantity, as text with a number of significant digits."""
             return f"{value:.{digits}g} {self.units.unit_of(quantity)}".rstrip()
 
         def pair(force: float, travel: float, between: str = ", ") -> str:

@@ -10,7 +10,10 @@ from .variables import sets_of_values
 
 
 def _first_case(build: Callable[..., Any], variables: Any, *_: Any, **__: Any) -> None:
-    """Build and run only the first set of values of a study, for a check of a script."""
+    """Build and run only the first set of values of a study, for a check of a script.
+
+    build, variables: arguments of `study`; its others are not used.
+    """
     build(**sets_of_values(variables)[0])
 
 
