@@ -170,7 +170,8 @@ class Contact(Part):
 
     @property
     def lagged(self) -> bool:
-        """True if friction at a point begins only in the step after its gap closure: for tools in three dimensions."""
+        """True for tools in three dimensions: a point whose gap closes in a step is in contact from the next step on.
+        """
         return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:

@@ -224,7 +224,8 @@ class Design:
 
         Args:
             min_wall: minimum wall thickness, length.
-            within: lowest and highest reference length of the nodes that count, length, as in `fit`; default all.
+            within: lowest and highest reference length (distance from the axis along the undeformed middle line) of
+                the nodes that count, length; default all.
             max_runs: maximum number of runs.
 
         Returns:

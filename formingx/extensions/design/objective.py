@@ -224,7 +224,7 @@ class MeasuredWallObjective(WallObjective):
         """Return the residuals of a run and their derivatives by the n parameters.
 
         The residuals are the relative deviations of the wall from the measured wall at the m points. With a prescribed
-        volume its deviation is appended, as in `WallObjective.residual`.
+        volume its relative deviation follows, multiplied by sqrt(m) `SearchSettings.volume_weight`.
 
         Args:
             run: a run of the search.

@@ -77,7 +77,7 @@ class PerturbedRun:
         x: locally owned unknowns of the state, shape (n,).
         control: load parameter (control) of the state, dimensionless.
         history_variables: history variables of the state.
-        plans: plans of the stages, see `formingx.solve.stage.plan`.
+        plans: `Plan` of each stage: the stage with the items of its scene given by their numbers.
         piece_end: time at which the present piece of a stage ends.
 
     Raises:

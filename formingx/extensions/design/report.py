@@ -24,7 +24,7 @@ def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units)
         result: result of the search.
         file: path of the HTML file.
         title: heading of the page.
-        deviations: standard deviations of the parameters, see `DesignRun.spread`, or None.
+        deviations: {parameter: standard deviation}, a `Fit`, or a list of such; None: without uncertainty.
         units: units of the labels.
 
     Returns:
@@ -70,7 +70,7 @@ def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> Fi
         run: the `DesignRun`.
         file: path of the HTML file.
         title: heading of the page.
-        deviations: standard deviations of the parameters, see `DesignRun.spread`, or None.
+        deviations: {parameter: standard deviation}, a `Fit`, or a list of such; None: without uncertainty.
         units: units of the labels.
 
     Returns:

@@ -131,8 +131,8 @@ def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
 
     Args:
         run: the `DesignRun`.
-        given: standard deviations of the parameters, see `covariance_of`.
-        measure: the quantity, see `DesignRun.derivative`.
+        given: {parameter: standard deviation}, a `Fit` with its covariance, or a list of such.
+        measure: the quantity: "wall", "volume", a column of the path, or a function of a path.
         confidence: confidence level of the band, between 0 and 1.
 
     Returns:

@@ -164,13 +164,13 @@ def _fit_timed(fitted: Callable, material: Any, data: Any, terms: int | None, re
     """Fit a relaxing material to tests in time, and return the result.
 
     Args:
-        fitted: function that fits the constants of materials of this class, see `IN_TIME`.
+        fitted: function that fits the constants of materials of this class.
         material: class, or material with initial constants.
         data: list of `TimedTest`, or the name of a CSV file.
-        terms: see `fit`.
-        relative: see `fit`.
+        terms: number of branches; None: as many as the tests determine.
+        relative: True for misfits over the measured stress, False for misfits in stress.
         weights: weight of each test, or None.
-        within: see `fit`.
+        within: lowest and highest stretch of the points that count, or None.
     """
     tests = _tests_in_time(data) if isinstance(data, str | os.PathLike) else data
     number = len(tests) if isinstance(tests, list | tuple) else 0

@@ -90,7 +90,7 @@ def fit_damping(material: Any, tests: Any, terms: int | None, relative: bool, we
         material: a `KBKZ` with the initial damping.
         tests: list of `TimedTest`.
         terms: must be None.
-        relative: True for misfits over the measured stress, False for misfits in stress; see `fit`.
+        relative: True for misfits over the measured stress, False for misfits in stress.
         weights: weight of each test.
         within: lowest and highest stretch of the points that count, or None.
 

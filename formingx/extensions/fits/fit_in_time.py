@@ -99,7 +99,7 @@ def fit_timed_tests(material: type[RelaxingMaterial] | RelaxingMaterial, tests: 
         material: class, or material with initial constants.
         tests: list of `TimedTest`.
         terms: number of branches for a class; None for as many as the tests determine, at most 10.
-        relative: True for misfits over the measured stress, False for misfits in stress; see `fit`.
+        relative: True for misfits over the measured stress, False for misfits in stress.
         weights: weight of each test.
         within: lowest and highest stretch of the points that count, or None.
 
@@ -166,7 +166,7 @@ class _TimedData:
     Args:
         tests: the checked tests.
         law: class of the material.
-        relative: True for misfits over the measured stress, False for misfits in stress; see `fit`.
+        relative: True for misfits over the measured stress, False for misfits in stress.
         weights: weight of each test.
 
     Attributes:

@@ -17,9 +17,9 @@ class Points:
     A biaxial test has two stresses at each of its points, the other tests have one.
 
     Args:
-        data: {test: (stretches, nominal stresses)}, see `fit`.
-        relative: True for misfits over the measured stress, False for misfits in stress; see `fit`.
-        weights: {test: weight}, or None; see `fit`.
+        data: {test: (stretches, nominal stresses)}, shape (n,) each; of "biaxial" two stretches and two stresses.
+        relative: True for misfits over the measured stress, False for misfits in stress.
+        weights: {test: weight of the squared misfits of its points}; None: weight 1.
         within: lowest and highest stretch of the points that count, or None.
 
     Attributes:
@@ -31,7 +31,7 @@ class Points:
         largest_I1: largest first invariant of C at the points.
 
     Raises:
-        InputError: wrong or inconsistent tests, no strain, or no point within the range; see `fit`.
+        InputError: wrong or inconsistent tests, no strain, or no point within the range.
     """
 
     def __init__(self, data: Any, relative: bool, weights: Any, within: Any):

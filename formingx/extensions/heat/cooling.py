@@ -65,7 +65,8 @@ class Cooling:
 
     Args:
         materials: {layer: `ThermalProperties`}, or one for all layers.
-        boundaries: laws of faces and heat sources, as in `formingx.heat`.
+        boundaries: list of `Convection`, `Radiation`, `HeatFlux`, `FixedTemperature`, `ContactWithTool` and
+            `Absorption`; several on one boundary add up.
         unit: unit of all temperatures, "C" or "K".
         tools: {name of a contact of the scene: (conductance, tool)}. The conductance is heat per time, area and degree;
             the tool is a prescribed temperature or a `ConductingTool`.

@@ -56,8 +56,9 @@ class HeatRun:
         outputs: requested output times, shape (k,).
         errors_in_space: estimated largest discretisation error of the temperature at these times, shape (k,), degrees.
         unit: unit of temperatures, "C" or "K".
-        states: for each step a list of temperatures: of the body at its locally owned nodes, then in each tool in
-            contact (see `HeatContact`).
+        states: for each step a list of arrays. The first has the temperatures of the body at its locally owned nodes,
+            shape (n,). One follows for each tool in contact: its excess temperatures over its back, at m nodes along
+            the depth, shape (contact nodes, m).
     """
 
     def __init__(self, body: Conduction, unit: str, outputs: np.ndarray):
@@ -173,13 +174,14 @@ class HeatRun:
 
         Args:
             times: times; default `outputs`.
-            line: reference positions (R, Z) of its two ends, length; default as in `through`.
+            line: reference positions (R, Z) of the two ends of the line, length. Default: from the first node of
+                `bottom` to the first node of `top` (or from `inner` to `outer`).
 
         Returns:
             Temperatures, shape (times,).
 
         Raises:
-            InputError: as in `through`.
+            InputError: a point outside the body, a time outside the run, or no default line.
         """
         _, T = self.through(times, line=line)
         weights = np.full(_LINE_POINTS, 2.0)
@@ -298,7 +300,8 @@ class HeatRun:
 
         Args:
             times: times; default `outputs`.
-            line: reference positions (R, Z) of its two ends, length; default as in `through`.
+            line: reference positions (R, Z) of the two ends of the line, length. Default: from the first node of
+                `bottom` to the first node of `top` (or from `inner` to `outer`).
             scale: factor of the distances on the axis, such as 1000 for mm.
             axes: matplotlib axes; default a new figure.
             style: options of the matplotlib lines.

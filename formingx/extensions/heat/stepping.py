@@ -20,8 +20,8 @@ class Step(NamedTuple):
     """Result of a trial time step of the heat equation.
 
     Attributes:
-        state: temperatures at the end of the step: of the body, shape (n,), then in each tool in contact, shape
-            (contact nodes, m).
+        state: temperatures of the body at the end of the step, shape (n,). Then for each tool in contact its excess
+            temperatures over its back, at m nodes along the depth, shape (contact nodes, m).
         error: estimated time integration error of the step, degrees.
         stored: heat that the whole body stores in the step.
         heats: heat that enters the body in the step through each boundary and from each source, shape (names,), in the
@@ -39,8 +39,8 @@ def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
 
     Args:
         body: heat equation of the body.
-        state: temperatures at the start: of the body, shape (n,), then in each tool in contact, shape (contact nodes,
-            m).
+        state: temperatures of the body at the start, shape (n,). Then for each tool in contact its excess temperatures
+            over its back, at m nodes along the depth, shape (contact nodes, m).
         dt: length of the step, time.
 
     Returns:

@@ -215,7 +215,7 @@ class Preformed(NamedTuple):
             axisymmetric: True for a body of revolution.
 
         Returns:
-            Six entries (see `Preformed.b`), shape (n, 6); J, shape (n,).
+            Entries rr, rz, zz and hoop entry of b, cosine and sine of the rotation of F, shape (n, 6); J, shape (n,).
         """
         x, reference, (shapes, *slopes) = self.x[cells], self.reference[cells], _tabulated(_POSITIONS, coordinates, 1)
         grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, reference))

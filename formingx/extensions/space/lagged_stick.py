@@ -46,7 +46,7 @@ class LaggedStick(ContactLaw):
         tool: tool with a method `signed_distance`.
         k: penalty, stress/length.
         theta: a point sticks where its signed distance exceeds -theta, length.
-        separates: True if points in tension separate at the end of a step, see `in_tension`.
+        separates: True if points in tension separate at the end of a step.
     """
 
     has_history = adhesive = sticks = True

@@ -224,7 +224,7 @@ class StabilityAnalysis:
 
         Args:
             modes: wave numbers.
-            states: number of states, "all", or states of the path, as in `Path.stability`.
+            states: number of states, evenly spaced on the path; "all"; or a list of states of the path.
 
         Returns:
             Counts and critical points.

@@ -169,7 +169,7 @@ class Study(ColumnTable):
             evaluations: maximum number of further runs, one after the other.
             within: {variable: (lowest, highest)}; a variable without a range keeps its best value. Default: all varied
                 variables, within the ranges of the study.
-            executor: as in `study`; default: a new process.
+            executor: executor of `concurrent.futures` in which the runs take place; default: a new process.
 
         Returns:
             The best run.
