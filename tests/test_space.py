@@ -253,7 +253,7 @@ def test_tools_from_stl_have_exact_distances_and_known_undercuts(tmp_path):
     near = np.abs(box.signed_distance(x)) < 0.1
     np.testing.assert_allclose(solid.signed_distance(x)[near], box.signed_distance(x)[near], atol=1e-3)
     found = solid.undercuts()
-    assert found["undercut_area"] == 0 and found["least_draft"] == pytest.approx(3.0, abs=0.01)
+    assert found["undercut_area"] == 0 and found["min_draft"] == pytest.approx(3.0, abs=0.01)
     behind = fx.tools.revolved(fx.Tool([(2.0, 0.0), (0.8, 0.0), (1.0, -1.0), (0.0, -1.0)]))     # wider below its mouth
     behind.to_stl(tmp_path / "behind.stl", wall=0.3)
     assert fx.tools.solid(tmp_path / "behind.stl").undercuts()["undercut_area"] == pytest.approx(

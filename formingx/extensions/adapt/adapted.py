@@ -25,7 +25,7 @@ _MAX_COLUMNS = 20_000
 def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | None = None) -> Mesh:
     """Return a new mesh of the body of a run, with columns of elements as fine as its states need. Collective.
 
-    The length of a new column is the smallest that a state demands. It is at most 1.25 times its neighbour's and at
+    The length of a new column is the smallest that a state demands. It is at most 1.25 times its neighbour's. It is at
     least an eighth of the column in the run, because lengths estimated on coarse columns are inaccurate. To refine
     further, adapt a second time from a run on the new mesh. The elements through the sheet, layers and interfaces stay.
 

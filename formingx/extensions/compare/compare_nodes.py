@@ -90,8 +90,8 @@ class NodalComparison:
 def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathLike | None = None) -> None:
     """Write a CSV file with the reference position and displacement of every node in a state (rank 0 writes).
 
-    The columns are node, R, Z, u_r, u_z, for a sheet in three dimensions node, X, Y, u_x, u_y, u_z, in the user's unit
-    of length.
+    The columns are node, R, Z, u_r, u_z, in the user's unit of length. For a sheet in three dimensions they are node,
+    X, Y, u_x, u_y, u_z.
 
     Args:
         path: the computed `Path`.

@@ -24,8 +24,8 @@ class SearchSettings:
             most of it. Removed from the search, it would leave a deviation below this share of the present one.
         damping: Levenberg damping over the largest singular value of the sensitivities.
         damping_measured: the same for the fit to a measured wall, which contains scatter.
-        min_improvement: the search ends after two runs that each lower the cost by less than this part, or before a
-            step for which the derivatives predict so little.
+        min_improvement: smallest relative decrease of the cost. The search ends after two runs that each decrease it by
+            less, or before a step for which the derivatives predict less.
         shortest_step: smallest part of a step that is tried, after halving a step that brought no improvement.
     """
 

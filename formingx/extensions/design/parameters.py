@@ -92,9 +92,9 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
     >>> fx.spline(3, start=2.0, low=1.0).start.tolist()
     [2.0, 2.0, 2.0]
     """
-    least = 4 if instance("spline: smooth", smooth, bool, "True or False") else 2
-    if count("spline: knots", knots) < least:
-        raise InputError(f"spline: knots = {knots}: must be at least {least}")
+    required = 4 if instance("spline: smooth", smooth, bool, "True or False") else 2
+    if count("spline: knots", knots) < required:
+        raise InputError(f"spline: knots = {knots}: must be at least {required}")
     values = [start] * knots if np.ndim(start) == 0 else several("spline: start", start, "numbers")
     if len(values) != knots:
         raise InputError(f"spline: start has {len(values)} numbers: must be one for each of {knots} knots")

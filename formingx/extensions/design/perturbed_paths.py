@@ -5,8 +5,8 @@ changed. Without history variables only the ends of the stages are solved for. W
 solved at every state of the base run, and has its own history variables.
 
 The sticking position of a node depends on the time of its gap closure, which changes with the parameter. So the node of
-the perturbed run is moved along the velocity of the base run onto the tool of the perturbed run, independently of the
-step. With the steps of the base run instead, derivatives were wrong by up to a factor of three.
+the perturbed run is moved along the velocity of the base run onto the tool of the perturbed run. The length of the step
+then has no effect. With the steps of the base run instead, derivatives were wrong by up to a factor of three.
 
 A perturbed state is compared with the state of the base run at the same event. If a gap closure ends the step and turns
 the path, the gap of the perturbed run is closed too. At a target the perturbed run meets its own target. Elsewhere the
@@ -341,8 +341,8 @@ def _fixed_properties(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[i
     Items are the loads, supports and contacts of the scene, counted from 0.
 
     Returns:
-        Numbers of the controlled items; for each table of an amplitude, the number of its item and the number of its
-        rows; numbers of the inactive items.
+        Numbers of the controlled items. For each table of an amplitude, (number of its item, number of its rows).
+        Numbers of the inactive items.
     """
     return p.numbers, [(i, len(table)) for i, table in p.tables], p.inactive
 

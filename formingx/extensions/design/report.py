@@ -275,8 +275,9 @@ def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
     """
     p, tenth = run.parameters, effects.jacobian * effects.sizes / 10
     thin, volume_change = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
-    head = ["", *(["before", "after"] if before else ["value"]), "least", "most", units.label("wall", "mean wall"),
-            units.label("wall", "minimum wall"), units.label("wall", "largest change"), units.label("volume")]
+    head = ["", *(["before", "after"] if before else ["value"]), "lower bound", "upper bound",
+            units.label("wall", "mean wall"), units.label("wall", "minimum wall"),
+            units.label("wall", "largest change"), units.label("volume")]
     most = tenth[abs(tenth).argmax(0), np.arange(len(p))]
     rows = [[name, *([page.number(before.vector[k])] if before else []),
              *(page.number(v) for v in (run.vector[k], p.low[k], p.high[k])),

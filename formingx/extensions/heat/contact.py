@@ -11,8 +11,8 @@ excess temperature w of the tool is its temperature minus the prescribed tempera
           -k \frac{\partial w}{\partial y} = -q \text{ at the face}, \qquad w = 0 \text{ at the back}
 
 with the heat capacity C per volume and the conductivity k. In an implicit stage of a time step the temperatures below a
-node respond linearly to q. The face of the tool has the temperature T_0 - z q, with the temperature T_0 that it would
-have without flux, and one compliance z for all nodes. So only the temperatures T of the body remain unknown:
+node respond linearly to q. The face of the tool has the temperature T_0 - z q. Without flux it would have T_0, and the
+compliance z is the same for all nodes. So only the temperatures T of the body remain unknown:
 
 .. math:: q = g (T_0 - T), \qquad g = \frac{h}{1 + z h}
 """

@@ -96,10 +96,10 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
             times: np.ndarray) -> dict[str, tuple[float, float]]:
     """Return {boundary: (smallest, largest) penetration depth of heat, length}.
 
-    A depth is sqrt(a t). The smallest belongs to the smallest diffusivity a of all layers, at the first output time or
-    at `_FIRST_ACCURATE_TIME` of the last one, if that is earlier. The largest belongs to the largest diffusivity, at
-    the last output time. At a boundary with absorption the smallest is 1 / absorption coefficient, or the smaller of
-    both if another law acts there too.
+    A depth is sqrt(a t) with a diffusivity a and a time t. The smallest has the smallest diffusivity of all layers. Its
+    time is the first output time, or `_FIRST_ACCURATE_TIME` of the last one if that is earlier. The largest has the
+    largest diffusivity, and its time is the last output time. At a boundary with absorption the smallest is 1 /
+    absorption coefficient, or the smaller of both if another law acts there too.
 
     Args:
         materials: {layer: `ThermalProperties`}.

@@ -140,7 +140,7 @@ class MemoryIntegral:
 
         Returns:
             Inverse tensors of the past states, shape (K, 4, n). Damping h, the factor of a past state's stress, and its
-            derivatives by the invariants I1 and I2 of the Finger tensor since that state, shape (K, n) each.
+            derivatives by I1 and I2, shape (K, n) each. These are the invariants of the Finger tensor since that state.
         """
         inverse = _inverse(past)
         if self.damping is None:

@@ -1,6 +1,6 @@
 """Sliding contact in three dimensions, with or without friction, in which points open and close only between steps.
 
-Contact is lagged: a point whose gap closed in a step is in contact from the next step on, and then stays on the surface
+Contact is lagged: a point whose gap closed in a step is in contact from the next step on. It then stays on the surface
 of the tool. Its traction per unit reference area is
 
 .. math:: t = k d n + T, \\qquad T = \\frac{\\mu N_0}{g_s} g, \\quad |g| \\le g_s,

@@ -175,13 +175,13 @@ class Swept(SolidTool):
             return x[:, axis], way, np.zeros(len(x))
         half = np.array(self.half) - self.corner if self.kind == "box" else np.zeros(2)
         sign, u = np.where(x[:, :2] < 0, -1.0, 1.0), np.abs(x[:, :2]) - half
-        least = min(self.half) - self.corner if self.kind == "box" else 0.0
+        inner_half = min(self.half) - self.corner if self.kind == "box" else 0.0
         outside = np.hypot(*np.maximum(u, 0.0).T)
         flat = (u.min(1) < 0) | (outside == 0)
         way[:, :2] = sign * np.maximum(u, 0.0) / np.maximum(outside, 1e-300)[:, None]
         way[flat, :2] = (sign * (np.arange(2) == u.argmax(1)[:, None]))[flat]
         bend = np.where(flat, 0.0, 1 / np.maximum(outside, 1e-300))
-        return least + outside + np.minimum(u.max(1), 0.0), way, bend
+        return inner_half + outside + np.minimum(u.max(1), 0.0), way, bend
 
     @property
     def _size(self) -> float:

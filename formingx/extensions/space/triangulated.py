@@ -70,7 +70,7 @@ class Triangulated(SolidTool):
             along: direction in which the part leaves the mould, shape (3,), of any length.
 
         Returns:
-            {"undercut_area": area of the triangles whose normal points against the direction, length^2, "least_draft":
+            {"undercut_area": area of the triangles whose normal points against the direction, length^2, "min_draft":
             smallest angle between another triangle and the direction, degrees; 90 if there is none}.
         """
         from scipy.spatial import ConvexHull
@@ -85,7 +85,7 @@ class Triangulated(SolidTool):
         draft = np.degrees(np.arcsin(np.clip(normal @ way / (2 * area), -1, 1)))
         under = inner & (draft < -0.01)
         return {"undercut_area": float(area[under].sum()),
-                "least_draft": float(draft[inner & ~under].min(initial=90.0))}
+                "min_draft": float(draft[inner & ~under].min(initial=90.0))}
 
     def __repr__(self) -> str:
         return f"solid({self.name!r})"
@@ -108,7 +108,7 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
     >>> cup = fx.tools.revolved(fx.tools.cup(radius=30.0, depth=20.0, draft=5.0).mirrored())
     >>> cup.to_stl("mould.stl", wall=5.0)
     >>> mould = fx.tools.solid("mould.stl")
-    >>> mould.triangles, round(mould.undercuts()["least_draft"], 1)
+    >>> mould.triangles, round(mould.undercuts()["min_draft"], 1)
     (768, 5.0)
     """
     name = os.fspath(file_path("solid: file", file))

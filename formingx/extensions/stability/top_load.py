@@ -138,8 +138,8 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     """Press a stress-free body down onto a frictionless plate by its neck, and find its buckling loads.
 
     The neck is constrained radially and round the axis. The plate is slightly compliant: the foot sinks into it by
-    about a thousandth of the wall. So the contact of the standing ring of a bottle can roll along the plate, while on a
-    rigid plate it would hop from point to point.
+    about a thousandth of the wall. So the contact of the standing ring of a bottle rolls along the plate. On a rigid
+    plate it would hop from point to point.
 
     Args:
         body: mesh of the body, for example `Path.deformed_mesh()`.
