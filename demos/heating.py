@@ -81,7 +81,7 @@ def main():
         dots[name] = (1e3 * THICKNESS * np.array(list(places.values())), right)
         if name == "convection":
             s, weights = np.polynomial.legendre.leggauss(20)
-            names, found = [*names, "mean"], np.column_stack([found, heated.mean_through()])
+            names, found = [*names, "mean"], np.column_stack([found, heated.line_mean()])
             right = np.column_stack([right, exact((s + 1) / 2) @ weights / 2])
         # from the initial to the steady temperature, or to the highest one
         span = {"convection": 175.0, "two_sides": 195.0}.get(name, right.max() - START)

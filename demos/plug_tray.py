@@ -51,7 +51,7 @@ def numbers(path):
     wall, part = path.wall(), path.part(density=DENSITY, units=UNITS)
     return {"weight_g": part.weight, "least_wall_mm": part.min_wall, "least_at_mm": list(part.min_wall_at),
             "plug_force_N": float(np.abs(path["plug_force"]).max()),
-            "walls_mm": {name: THICKNESS * wall.around(place, AROUND) for name, place in PLACES.items()},
+            "walls_mm": {name: THICKNESS * wall.mean_ratio(place, AROUND) for name, place in PLACES.items()},
             "touching": path.filling("mould").touching[-1], "triangles": len(wall.wall), "states": len(path),
             "iterations": path.counts.iterations, "failures": path.counts.failures, "seconds": path.counts.seconds}
 

@@ -54,7 +54,7 @@ def draw(runs, file, columns, between):
     """
     drawing, axes = figure(columns, width=4.4, height=4.0, rows=-(-(len(runs) + 1) // columns))
     for a, (title, run) in zip(axes, runs.items()):
-        run.plot_through(scale=1e3, axes=a)
+        run.plot_line_profile(scale=1e3, axes=a)
         a.set(title=_in_words(title), xlabel="above the bottom face, mm")
         for line in a.lines:
             line.set_label(line.get_label().removeprefix("t = "))

@@ -36,7 +36,7 @@ def tray(size, tool, **contact):
 def key_numbers(path):
     """Return the numbers of the summary of a tray."""
     wall = path.wall()
-    return {**{name: wall.around(place, 0.06) for name, place in PLACES.items()}, "least": wall.ratio.min(),
+    return {**{name: wall.mean_ratio(place, 0.06) for name, place in PLACES.items()}, "least": wall.ratio.min(),
             "iterations": path.counts.iterations, "failures": path.counts.failures, "states": len(path),
             "unknowns": path.problem.n_unknowns, "seconds": path.counts.seconds}
 

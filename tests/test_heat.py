@@ -78,7 +78,7 @@ def test_convection_and_absorption_are_those_of_the_series():
     assert found == pytest.approx(exact, abs=1e-4 * (exact.max() - 25))
     s, weights = np.polynomial.legendre.leggauss(20)
     mean = reference.series(SLAB, 25.0, (60.0, 10.0), (220.0, 80.0), D * (s + 1) / 2, times, source) @ weights / 2
-    assert run.mean_through() == pytest.approx(mean, abs=1e-4 * (exact.max() - 25))
+    assert run.line_mean() == pytest.approx(mean, abs=1e-4 * (exact.max() - 25))
 
 
 def test_a_temperature_step_at_a_face_causes_no_oscillation():

@@ -31,7 +31,7 @@ def test_times_of_output_are_hit_and_between_steps_the_temperature_is_smooth(hea
 def test_hottest_coldest_and_when_the_sheet_is_in_a_window(heated):
     hot, cold = heated.hottest(), heated.coldest()
     assert abs(hot.Z) < 1e-9 and cold.Z > D / 2
-    distance, T = heated.through([20.0])
+    distance, T = heated.line_profile([20.0])
     assert T.max() == pytest.approx(hot.temperature, abs=1e-9) and distance[-1] == pytest.approx(D)
     assert T.min() >= cold.temperature - 0.05
     window = heated.time_to_reach(30.0, 90.0)
@@ -59,7 +59,7 @@ def test_initial_temperatures_given_in_all_ways_agree(heated, tmp_path):
     assert sides(start=table, times=[1e-3]).at_points(places, [0.0])[0] == pytest.approx(100.0, abs=1e-2)
     cooled = fx.heat(strip(6), SHEET, [], start=heated, times=30.0, unit="C")      # no law: nothing gets out
     assert cooled.heat_stored.sum() == pytest.approx(0.0, abs=1e-9 * heated.heat_stored.sum())
-    assert np.ptp(cooled.through()[1]) < np.ptp(heated.through()[1][-1]) / 3
+    assert np.ptp(cooled.line_profile()[1]) < np.ptp(heated.line_profile()[1][-1]) / 3
 
 
 def test_celsius_and_kelvin_are_the_same_run():
@@ -71,7 +71,7 @@ def test_celsius_and_kelvin_are_the_same_run():
         laws = [fx.Radiation("top", emissivity=0.85, heater=400 + zero, stefan_boltzmann=5.670374419e-8 / mm**2),
                 fx.ContactWithTool("bottom", conductance=50 / mm**2, tool=60 + zero)]
         run = fx.heat(mesh, sheet, laws, start=25.0 + zero, times=[4.0], unit="K" if unit == "K" else "C")
-        found[unit] = run.through(points=9)[1][0] - zero
+        found[unit] = run.line_profile(points=9)[1][0] - zero
         assert np.abs(run.balance).max() < 1e-10
     assert found["K"] == pytest.approx(found["C"], rel=1e-7)
     assert found["mm"] == pytest.approx(found["C"], rel=1e-7)
@@ -83,7 +83,7 @@ def test_files_and_picture(heated, tmp_path):
     assert rows[0].startswith("time,estimated_error [C],coldest [C],hottest [C],heat_stored,heat of Convection")
     assert len(rows) == len(heated.times) + 1
     assert float(rows[-1].split(",")[3]) == heated.hottest().temperature
-    axes = heated.plot_through()
+    axes = heated.plot_line_profile()
     assert [line.get_label() for line in axes.lines] == ["t = 5", "t = 20"]
     assert axes.lines[1].get_ydata()[0] == pytest.approx(heated.at_points([(0.0, 0.0)])[-1, 0])
 
@@ -95,7 +95,7 @@ import formingx as fx
 from test_heat import SHEET, SKIN, TWO, everything
 mesh = fx.mesh.disc(radius=5e-3, thickness=TWO, elements=(3, 2))
 run = fx.heat(mesh, {"core": SHEET, "skin": SKIN}, everything(), start=25.0, times=[0.2, 0.5], unit="C", tolerance=0.05)
-numbers = [*run.at_points([(1e-3, 1e-3), (4e-3, 2e-3)]).ravel(), *run.hottest(), *run.mean_through(),
+numbers = [*run.at_points([(1e-3, 1e-3), (4e-3, 2e-3)]).ravel(), *run.hottest(), *run.line_mean(),
            *(h.sum() for h in run.heat_through.values()), *run.tool_profile("bottom", (2e-3, 0))[1], len(run.times)]
 try:
     fx.heat(mesh, {"core": SHEET, "skin": SKIN}, [], start=fx.table({0: 20, 3e-3: 50}), times=1.0, unit="C")

@@ -185,7 +185,7 @@ def test_a_run_in_three_dimensions_continues_from_a_checkpoint(tmp_path):
     for normal in ((0, 1, 0), (0, -1, 0)):                                          # along a plane of symmetry
         edge = wall.section((0, 0, 0), normal)
         assert edge["arc_length"][-1] == pytest.approx(cut["arc_length"][-1], abs=0.05) and np.ptp(edge["y"]) < 1e-8
-    assert wall.around((0, 0, 0), 10.0) == pytest.approx((wall.ratio * wall.reference_area).sum() / 0.3)
+    assert wall.mean_ratio((0, 0, 0), 10.0) == pytest.approx((wall.ratio * wall.reference_area).sum() / 0.3)
     with pytest.raises(fx.InputError, match=r"normal = \(0, 0, 0\): must not be 0"):
         whole.wall().section((0, 0.15, 0), (0, 0, 0))
     whole.to_stl(tmp_path / "part.stl")
@@ -548,7 +548,7 @@ def test_moulds_from_files_fill(make, tmp_path):
         path = fx.trace(scene, until=fx.pressure(1.2), progress=False)
         filled = path.filling()
         assert path.counts.failures == 0 and filled.touching[-1] > 0.98 and filled.gap[-1] < 2e-3
-        walls.append([path.wall().around(place, 0.1) for place in places])
+        walls.append([path.wall().mean_ratio(place, 0.1) for place in places])
     np.testing.assert_allclose(walls[1], walls[0], rtol=5e-3)
 
 

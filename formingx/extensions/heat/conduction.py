@@ -230,7 +230,7 @@ class Conduction(HeatVectors):
         self._factorise(0.0, [], afresh=True)
         return self._solve(rate)
 
-    def through_fixed_faces(self, missing: np.ndarray) -> np.ndarray:
+    def heat_through_fixed_faces(self, missing: np.ndarray) -> np.ndarray:
         """Return the heat that enters the body in a step through each face of prescribed temperature.
 
         A node on such a face stores more heat in the step than conduction, laws of other faces and sources supply. The

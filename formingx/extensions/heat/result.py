@@ -149,8 +149,8 @@ class HeatRun:
         reader = PointReader(self._body.space, points)
         return np.array([reader.read(self.temperature(t).x.array) for t in self._times_or_outputs(times)])
 
-    def through(self, times: Any = None, *, line: Any = None,
-                points: int = _LINE_POINTS) -> tuple[np.ndarray, np.ndarray]:
+    def line_profile(self, times: Any = None, *, line: Any = None,
+                     points: int = _LINE_POINTS) -> tuple[np.ndarray, np.ndarray]:
         """Return temperatures along a straight line through the body.
 
         Args:
@@ -169,7 +169,7 @@ class HeatRun:
         s = np.linspace(0, 1, points)
         return s * float(np.hypot(*(last - first))), self.at_points(first + np.outer(s, last - first), times)
 
-    def mean_through(self, times: Any = None, *, line: Any = None) -> np.ndarray:
+    def line_mean(self, times: Any = None, *, line: Any = None) -> np.ndarray:
         """Return the mean temperature along a straight line through the body, by Simpson's rule.
 
         Args:
@@ -183,7 +183,7 @@ class HeatRun:
         Raises:
             InputError: a point outside the body, a time outside the run, or no default line.
         """
-        _, T = self.through(times, line=line)
+        _, T = self.line_profile(times, line=line)
         weights = np.full(_LINE_POINTS, 2.0)
         weights[1::2], weights[0], weights[-1] = 4.0, 1.0, 1.0
         return T @ (weights / weights.sum())
@@ -294,8 +294,8 @@ class HeatRun:
         rows = gathered(self._comm, table)
         files.write_rows(file, ["R", "Z", "T"], rows.tolist(), self._comm)
 
-    def plot_through(self, times: Any = None, *, line: Any = None, scale: float = 1.0, axes: Any = None,
-                     **style: Any) -> Any:
+    def plot_line_profile(self, times: Any = None, *, line: Any = None, scale: float = 1.0, axes: Any = None,
+                          **style: Any) -> Any:
         """Draw the temperature along a line through the body, one curve per time.
 
         Args:
@@ -312,7 +312,7 @@ class HeatRun:
         from ...figures import figure
         axes = figure()[1] if axes is None else axes
         chosen = self._times_or_outputs(times)
-        distance, T = self.through(chosen, line=line)
+        distance, T = self.line_profile(chosen, line=line)
         for k, (t, row) in enumerate(zip(chosen, T)):
             shade = {"color": _colour(k, len(chosen))} | style
             axes.plot(scale * distance, row, **{"label": f"t = {t:g}"} | shade)

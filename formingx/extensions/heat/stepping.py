@@ -61,7 +61,7 @@ def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
     missing = body.mass(change[0]) - dt * sum(w * r[0] for w, r in zip(WEIGHTS, rates))
     through = dt * (WEIGHTS @ np.array([heats_first, second.heats, third.heats]))
     return Step([a + b for a, b in zip(state, change)], error, body.stored(change[0]),
-                np.concatenate([through, body.through_fixed_faces(missing)]))
+                np.concatenate([through, body.heat_through_fixed_faces(missing)]))
 
 
 def next_length(dt: float, error: float, tolerance: float) -> float:

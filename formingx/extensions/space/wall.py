@@ -117,7 +117,7 @@ class SheetWall(ColumnTable):
         away = np.hypot(*(self.reference_points[:, :COORDINATES] - pair("thickness_at", (x, y))).T)
         return float(self.at_nodes[np.argmin(away)])
 
-    def around(self, point: tuple[float, float, float], radius: float) -> float:
+    def mean_ratio(self, point: tuple[float, float, float], radius: float) -> float:
         """Return the mean ratio of deformed to reference thickness around a point of the part.
 
         It is the mean of the triangles whose deformed centroid lies within a radius of the point, weighted with their
@@ -133,8 +133,8 @@ class SheetWall(ColumnTable):
         Raises:
             InputError: a radius that is not positive.
         """
-        away = np.linalg.norm(self.middle - triple("around: point", point), axis=1)
-        near = away <= positive("around: radius", radius)
+        away = np.linalg.norm(self.middle - triple("mean_ratio: point", point), axis=1)
+        near = away <= positive("mean_ratio: radius", radius)
         if not near.any():
             return float(self.ratio[np.argmin(away)])
         return float(np.average(self.ratio[near], weights=self.reference_area[near]))
