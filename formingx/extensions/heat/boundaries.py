@@ -70,7 +70,7 @@ class _Boundary:
         self.parameters = {name: value if isinstance(value, Table) else finite(f"{caller}: {name}", value)
                            for name, value in parameters.items()}
 
-    def _between(self, name: str, low: float, high: float = float("inf")) -> None:
+    def _check_range(self, name: str, low: float, high: float = float("inf")) -> None:
         """Raise an InputError unless the values of the parameter `name` lie between `low` and `high`."""
         value = self.parameters[name]
         for number in value.y if isinstance(value, Table) else [value]:
@@ -87,7 +87,7 @@ class _Boundary:
         """
         for name, value in self.parameters.items():
             if name in self.temperatures:
-                self._between(name, absolute_zero)
+                self._check_range(name, absolute_zero)
             if isinstance(value, Table):
                 value.check(mesh.nodes_of(self.on)[:, 0], f"R on {self.on!r}")
 
@@ -116,7 +116,7 @@ class Convection(_Boundary):
 
     def __init__(self, on: str, *, h: float | Table, air: float | Table):
         super().__init__(on, h=h, air=air)
-        self._between("h", 0.0)
+        self._check_range("h", 0.0)
 
     def flux(self, T, absolute_zero, h, air):
         """Return the heat flux h (air - T) into the face.
@@ -162,8 +162,8 @@ class Radiation(_Boundary):
                  stefan_boltzmann: float = STEFAN_BOLTZMANN):
         super().__init__(on, emissivity=emissivity, heater=heater, view_factor=view_factor,
                          stefan_boltzmann=positive(f"Radiation({on!r}): stefan_boltzmann", stefan_boltzmann))
-        self._between("emissivity", 0.0, 1.0)
-        self._between("view_factor", 0.0, 1.0)
+        self._check_range("emissivity", 0.0, 1.0)
+        self._check_range("view_factor", 0.0, 1.0)
 
     def flux(self, T, absolute_zero, emissivity, heater, view_factor, stefan_boltzmann):
         """Return the heat flux into the face, proportional to heater^4 - T^4 in absolute temperatures.

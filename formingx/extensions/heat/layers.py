@@ -163,10 +163,10 @@ class _Nodes:
     def __init__(self, grid: Grid, cuts: dict[tuple[int, int], np.ndarray]):
         self._old, self._cuts = grid.points, cuts
         self.points: list[Any] = [*grid.points]
-        self._on: dict[tuple[int, int], list[int]] = {}
+        self._edge_nodes: dict[tuple[int, int], list[int]] = {}
         self._middles: dict[tuple[int, int], int] = {}
 
-    def along(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
+    def edge_nodes(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
         """Return the nodes along an edge from node a to node b, with new nodes at its cuts.
 
         Args:
@@ -181,10 +181,10 @@ class _Nodes:
         forward = bool(_ordered(self._old, np.array([[a, b]]))[0, 0] == a)
         key = (a, b) if forward else (b, a)
         places = np.concatenate([[0.0], self._cuts.get(key, np.zeros(0)), [1.0]])
-        if key not in self._on:
+        if key not in self._edge_nodes:
             shape = curve if forward else curve[[1, 0, *range(2, len(curve))]]
-            self._on[key] = [key[0], *(self._new(p) for p in _on_curve(shape, places[1:-1])), key[1]]
-        nodes = self._on[key]
+            self._edge_nodes[key] = [key[0], *(self._new(p) for p in _on_curve(shape, places[1:-1])), key[1]]
+        nodes = self._edge_nodes[key]
         return (nodes, places) if forward else (nodes[::-1], 1 - places[::-1])
 
     def middle(self, a: int, b: int, point: np.ndarray | None = None) -> int:
@@ -238,7 +238,7 @@ def _cut_grid(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
     for name, edges in grid.boundaries.items():
         found = []
         for row in _integer_rows(edges):
-            line, _ = nodes.along(row[0], row[1], grid.points[row])
+            line, _ = nodes.edge_nodes(row[0], row[1], grid.points[row])
             found += [[a, b, nodes.middle(a, b)] if quadratic else [a, b] for a, b in zip(line, line[1:])]
         boundaries[name] = np.array(found, dtype=np.int64).reshape(-1, 3 if quadratic else 2)
     points = np.array(nodes.points)
@@ -263,7 +263,7 @@ def _pieces(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[
     sides = {}
     for k, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):
         middle = [row[3 + k]] if quadratic else []
-        line, places = nodes.along(row[i], row[j], grid.points[[row[i], row[j], *middle]])
+        line, places = nodes.edge_nodes(row[i], row[j], grid.points[[row[i], row[j], *middle]])
         sides[k] = line
         at |= {n: (1 - s) * np.eye(3)[i] + s * np.eye(3)[j] for n, s in zip(line[1:-1], places[1:-1])}
         if quadratic and len(line) == 2:

@@ -80,7 +80,7 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
     moved = None if displacement is None else _Displacement(displacement, mesh)
     fine = layered(mesh, _depths(materials, boundaries, outputs), moved)
     make = partial(Conduction, fine, materials, boundaries, kinematics, ABSOLUTE_ZERO[unit],
-                   displacement if moved is None or fine is mesh else moved.on(fine))
+                   displacement if moved is None or fine is mesh else moved.on_mesh(fine))
     body = make()
     try:
         _set_initial_temperature(body, start, unit)
@@ -136,7 +136,7 @@ class _Displacement:
         return points + np.column_stack([fields.values_at(part, points, self._mesh, "heat: displacement")
                                          for part in self._parts])
 
-    def on(self, mesh: Mesh) -> fem.Function:
+    def on_mesh(self, mesh: Mesh) -> fem.Function:
         """Return the displacement as a quadratic `Function` on another mesh of the same body, length."""
         u = fem.Function(fem.functionspace(mesh.domain, ("Lagrange", 2, (2,))))
         points = dof_positions(u.function_space)

@@ -87,7 +87,7 @@ class MemoryIntegral:
         w[:-2] -= first
         return w
 
-    def weights_after(self, weights: np.ndarray, step: Any, before: Any = 0.0,
+    def weights_after(self, weights: np.ndarray, step: Any, last_step: Any = 0.0,
                       allowed: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the weights W of K past states in the stress at the end of a step in reduced time.
 
@@ -98,8 +98,8 @@ class MemoryIntegral:
         Args:
             weights: result of `weights` at the start of the step, shape (K, modes) or (K, modes, n).
             step: length of the step in reduced time, a number or, if it differs between n points, shape (n,).
-            before: length of the previous step in reduced time, a number or shape (n,). 0: no parabola, and h Cbar_k^-1
-                is linear in the step.
+            last_step: length of the previous step in reduced time, a number or shape (n,). 0: no parabola is used, and
+                h Cbar_k^-1 is linear in the step.
             allowed: 1 where a parabola is used, 0 at points where the last two states differ too much, shape (n,).
 
         Returns:
@@ -114,9 +114,9 @@ class MemoryIntegral:
         mean = _mean_decay(y)
         W[-1] += np.sum(G * (mean - decay), axis=0)
         slope[-1] += np.sum(G / self.tau[:, None] * (_mean_decay_slope(y) + decay), axis=0)
-        if len(W) > 1 and np.any(before):
-            known = np.asarray(before) > 0
-            rate = np.where(known, allowed / np.where(known, before, 1), 0)
+        if len(W) > 1 and np.any(last_step):
+            known = np.asarray(last_step) > 0
+            rate = np.where(known, allowed / np.where(known, last_step, 1), 0)
             shape = len(W), max(W.shape[1], np.size(rate))
             W, slope = np.broadcast_to(W, shape).copy(), np.broadcast_to(slope, shape).copy()
             quadratic = np.sum(G * _quadratic_weight(y), axis=0)

@@ -91,7 +91,7 @@ class PastStates:
 
         With this length it would be a parabola through the last two states and the end of the step.
         """
-        self._before = 0.0
+        self._last_step = 0.0
         self._refreshed = None
 
     def get(self) -> StoredStates:
@@ -112,7 +112,7 @@ class PastStates:
         times = np.array([state.reduced_time for state in variables.states])
         self._past = np.array([state.C for state in variables.states])
         self._weights = self._law.weights(times[-1] - times)
-        self._before = times[-1] - times[-2] if len(times) > 1 else 0.0       # gives the strain rate
+        self._last_step = times[-1] - times[-2] if len(times) > 1 else 0.0       # gives the strain rate
         self._parabola_allowed = 1.0 if len(times) < 2 else inner(self._past[-1], cofactor(self._past[-2])) < 4
         self._refreshed = None
 
@@ -122,7 +122,7 @@ class PastStates:
         C, step, rate = self._present()
         if self._refreshed and np.array_equal(self._refreshed[0], C) and np.array_equal(self._refreshed[1], step):
             return
-        W, slope = self._law.weights_after(self._weights, step, self._before, self._parabola_allowed)
+        W, slope = self._law.weights_after(self._weights, step, self._last_step, self._parabola_allowed)
         S, D, T = self._law.stress(C, self._past, W, slope, self._stored.smallest_h)
         count = np.array([1.0, 1.0, 2.0, 1.0])[:, None]
         T = T * rate

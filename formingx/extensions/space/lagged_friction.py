@@ -74,7 +74,7 @@ class LaggedFriction(LaggedStick):
         super().__init__(tool, k, theta, True)
         self.mu, self.elastic_slip = mu, elastic_slip
         self._last: tuple[np.ndarray, Distances] | None = None
-        self._ahead: tuple[ContactHistory, np.ndarray] | None = None
+        self._pressure_ahead: tuple[ContactHistory, np.ndarray] | None = None
 
     def part(self, points: np.ndarray | slice) -> LaggedFriction:
         """Return the contact law of some of the points.
@@ -133,13 +133,13 @@ class LaggedFriction(LaggedStick):
         Returns:
             Pressure of each point, shape (n,), stress.
         """
-        if self._ahead is None or self._ahead[0] is not old:
+        if self._pressure_ahead is None or self._pressure_ahead[0] is not old:
             now, change = np.maximum(old.distance, 0.0), old.closure - old.position
             depth = now
             if change.any():
                 depth = now + np.einsum("ni,ni->n", self.tool.distances(old.position).normal, change)
-            self._ahead = old, self.k * np.clip(depth, now / _MAX_PRESSURE_RATIO, _MAX_PRESSURE_RATIO * now)
-        return self._ahead[1]
+            self._pressure_ahead = old, self.k * np.clip(depth, now / _MAX_PRESSURE_RATIO, _MAX_PRESSURE_RATIO * now)
+        return self._pressure_ahead[1]
 
     def closure_at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
         """Return the positions, to be stored as `ContactHistory.closure`, whose depth in the tool encodes a pressure.

@@ -246,13 +246,13 @@ class StabilityAnalysis:
         for kind in kinds:
             counts[kind] = [unstable_modes(state, kind) for state in chosen]
             for a, b in zip(chosen, chosen[1:]):
-                critical_points += self._between(a, b, kind, unstable_modes)
+                critical_points += self._locate(a, b, kind, unstable_modes)
         order = self._path.states
         critical_points.sort(key=lambda point: (order.index(point.left),
                                                 abs(point.state.control - point.left.control)))
         return Stability(self._path, numbers, chosen, counts, critical_points)
 
-    def _between(self, a: State, b: State, kind: ModeClass, unstable_modes: Any) -> list[CriticalPoint]:
+    def _locate(self, a: State, b: State, kind: ModeClass, unstable_modes: Any) -> list[CriticalPoint]:
         """Return the critical points of modes of one kind between two states, located between neighbours of the path.
 
         Args:
@@ -270,7 +270,7 @@ class StabilityAnalysis:
         i, j = states.index(a), states.index(b)
         if j > i + 1:
             middle = states[(i + j) // 2]
-            return self._between(a, middle, kind, unstable_modes) + self._between(middle, b, kind, unstable_modes)
+            return self._locate(a, middle, kind, unstable_modes) + self._locate(middle, b, kind, unstable_modes)
         if a.setting != b.setting:
             return []
         low, high = sorted((unstable_modes(a, kind), unstable_modes(b, kind)))

@@ -192,7 +192,7 @@ class Modes:
             if abs(nearest.fraction - fraction) < settings.tolerance:     # the root may belong to another mode
                 fraction = low.fraction + settings.offset if nearest is low else high.fraction - settings.offset
             try:
-                samples.append(new := self._modes_of(fraction, self._between(a, b, fraction), kind, index))
+                samples.append(new := self._modes_of(fraction, self._state_between(a, b, fraction), kind, index))
             except Failure:
                 solved = False
                 break
@@ -258,7 +258,7 @@ class Modes:
                 found.append((sample.fraction, float(sample.values[np.argmax(overlaps)])))
         return found
 
-    def _between(self, a: State, b: State, fraction: float) -> State:
+    def _state_between(self, a: State, b: State, fraction: float) -> State:
         """Solve for the state at a fraction (0 to 1) of the way from state a of the path to state b.
 
         Raises:
