@@ -16,8 +16,10 @@ def digit(number):
 def assert_shows(shown, printed, rel=0.0):
     """Numbers may differ by one in the last digit shown, or by `rel` if that is more."""
     pieces = re.split(rf"({NUMBER}|\.\.\.|\s+)", shown.strip())
-    pattern = "".join(rf"({NUMBER})" if re.fullmatch(NUMBER, piece) else ".*?" if piece == "..." else
-                      r"\s+" if piece.isspace() else re.escape(piece) for piece in pieces)
+    first, *parts = "".join(rf"({NUMBER})" if re.fullmatch(NUMBER, piece) else "\0" if piece == "..." else
+                            r"\s+" if piece.isspace() else re.escape(piece) for piece in pieces).split("\0")
+    middle, last = parts[:-1], parts[-1:]                       # atomic: one way to fill each "..." is tried
+    pattern = first + "".join(rf"(?>.*?{part})" for part in middle) + "".join(rf".*?{part}" for part in last)
     found = re.fullmatch(pattern, printed.strip(), re.S)
     assert found, f"shown:\n{shown}\nprinted:\n{printed}"
     wanted = [piece for piece in pieces if re.fullmatch(NUMBER, piece)]

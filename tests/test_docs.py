@@ -74,6 +74,7 @@ def test_tutorials_have_the_same_sections(page):
     ("force 1.23 N", "force 1.2345 N", True), ("force 1.23 N", "force 1.2501 N", False), ("1.5e-06", "1.59e-06", True),
     ("force 1 N", "force  1\nN", True), ("force 1 N", "forces 1 N", False), ("", "1", False),
     ("2 runs, ... s", "2 runs, 7 s", True),
+    ("a ... 1\n... 2", "a 0 1\n1 2", True), ("a ... b ... c", "a c b", False), ("x ... " * 9 + "y", "x " * 300, False),
     ("2 runs, ... s", "3 runs, 7 s", False), ("[1. 2.]", "[1. 2. 3.]", False), ("-1.5", "1.5", False)])
 def test_printed_output_is_compared_to_the_shown_digits(shown, printed, same):
     with nullcontext() if same else pytest.raises(AssertionError):

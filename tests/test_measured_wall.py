@@ -66,6 +66,9 @@ def test_fitted_parameters_and_covariance_are_recovered(truth):
     J, left = by / part.wall[:, None], wall / part.wall - 1
     assert sure.covariance == pytest.approx(left @ left / 12 * np.linalg.inv(J.T @ J), rel=1e-6)
     assert 0.004 < np.sqrt(left @ left / 12) < 0.02 and sure.undetermined == sure.indistinguishable == []
+    slopes = answer.best.derivative("wall")[1]
+    with_correlation = np.sqrt(np.diag(slopes @ sure.covariance @ slopes.T))
+    assert answer.best.band(sure).deviation == pytest.approx(with_correlation, rel=1e-9)
     assert "deviation, rms" in str(answer) and "thickness" in str(sure)
     assert "measured" in [line.get_label() for line in answer.plot_wall().lines]
 
@@ -74,7 +77,7 @@ def test_undetermined_and_indistinguishable_parameters_are_named(truth):
     """Blown to a height, stiffness has no effect; two thicknesses that only their sum changes cannot be told apart."""
     part = noisy(truth, 0.01)
     sure = fx.Design(cap, RANGES | {"scale": (1.0, 0.5, 2.0)}).fit(wall=part, start=TRUE, max_runs=1).confidence
-    assert sure.undetermined == ["scale"] and "does not tell scale" in str(sure)
+    assert sure.undetermined == ["scale"] and "does not determine scale" in str(sure)
     apart = fx.Design(lambda sheet, film, height: cap(sheet + film, height), {
         "sheet": (0.45, 0.1, 0.8), "film": (0.1, 0.05, 0.2), "height": (7.0, 4.0, 9.0)}).fit(
             wall=part, max_runs=1).confidence

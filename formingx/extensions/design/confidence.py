@@ -13,7 +13,7 @@ from ...values.intervals import t_intervals
 _UNDETERMINED = 0.25
 """Standard error over the range of a parameter above which the wall leaves it undetermined."""
 _INDISTINGUISHABLE = 0.9
-"""Correlation above which two undetermined parameters cannot be told apart."""
+"""Correlation above which two undetermined parameters cannot be distinguished."""
 
 
 @dataclass(frozen=True)
@@ -84,8 +84,8 @@ class Confidence:
         lines = [f"{'':16}{'value':>10}{'error':>10}{'95 % from':>12}{'to':>10}"]
         lines += [f"{name:16}{value:10.4g}{error:10.2g}{low:12.4g}{high:10.4g}" for value, (name, error), (low, high)
                   in zip(self.values, self.errors.items(), self.intervals().values())]
-        lines += [f"the measured wall does not tell {name}" for name in self.undetermined]
-        lines += [f"{a} and {b} cannot be told apart: correlation {c:.2f}" for a, b, c in self.indistinguishable]
+        lines += [f"the measured wall does not determine {name}" for name in self.undetermined]
+        lines += [f"{a} and {b} cannot be distinguished: correlation {c:.2f}" for a, b, c in self.indistinguishable]
         return "\n".join(lines)
 
     __repr__ = __str__

@@ -215,7 +215,8 @@ class DesignRun:
 
         Args:
             deviations: {parameter: standard deviation}; the knots of a profile are independent, with equal deviations.
-                Or a `Fit` whose constants have the names of parameters, with its covariance. Or a list of such.
+                Or a `Fit` whose constants have the names of parameters, or the `Confidence` of a fit to a measured
+                wall, with its covariance. Or a list of such.
             measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
 
         Returns:
@@ -231,7 +232,7 @@ class DesignRun:
         """Return an output quantity with its confidence band for uncertain parameters, to first order.
 
         Args:
-            deviations: {parameter: standard deviation}, a `Fit`, or a list of such, see `spread`.
+            deviations: {parameter: standard deviation}, a `Fit`, a `Confidence`, or a list of such, see `spread`.
             measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
             confidence: confidence level of the band, between 0 and 1, for a normal distribution.
 

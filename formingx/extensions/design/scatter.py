@@ -90,8 +90,8 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
         caller: name of the caller, for messages.
         parameters: the parameters of the design.
         given: {parameter: standard deviation}; the knots of a profile are independent, with equal deviations. Or a
-            `Fit` whose constants have the names of parameters, with its covariance. Or a list of such, independent of
-            each other.
+            `Fit` whose constants have the names of parameters, or the `Confidence` of a fit to a measured wall, with
+            its covariance. Or a list of such, independent of each other.
 
     Returns:
         Covariance, shape (n, n).
@@ -108,8 +108,8 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
                 if not numbers:
                     raise _unknown(caller, name, parameters)
                 found[numbers, numbers] += non_negative(f"{caller}: {name}", size) ** 2
-        elif hasattr(part, "covariance") and hasattr(part, "constants"):
-            names = list(part.constants)
+        elif hasattr(part, "covariance"):
+            names = list(part.constants if hasattr(part, "constants") else part.names)
             for name in names:
                 if name not in parameters.names:
                     raise _unknown(caller, name, parameters)
@@ -121,8 +121,8 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
             numbers = [parameters.names.index(name) for name in names]
             found[np.ix_(numbers, numbers)] += part.covariance
         else:
-            raise InputError(f"{caller}: {part!r}: must be {{parameter: standard deviation}}, a Fit, or a list of"
-                             f" these")
+            raise InputError(f"{caller}: {part!r}: must be {{parameter: standard deviation}}, a Fit, a Confidence, or a"
+                             f" list of these")
     return found
 
 

@@ -27,7 +27,8 @@ from .instability import CriticalPoint, Stability, wave_numbers
 _FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
 """Arguments of the `Contact` of the foot: enough points on a compliant plate to let the standing ring roll.
 
-The compliance is about a thousandth of the wall. On a rigid plate a contact line hops from point to point.
+A traction p sinks the foot by p h/(2 mu), with the shear modulus mu and the depth h of the body behind the foot. On a
+rigid plate a contact line hops from point to point.
 """
 
 _LARGEST_STEP = 0.004
@@ -137,9 +138,10 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
              step: StepControl | None = None, units: Units | None = None) -> TopLoad:
     """Press a stress-free body down onto a frictionless plate by its neck, and find its buckling loads.
 
-    The neck is constrained radially and round the axis. The plate is slightly compliant: the foot sinks into it by
-    about a thousandth of the wall. So the contact of the standing ring of a bottle rolls along the plate. On a rigid
-    plate it would hop from point to point.
+    The neck is constrained radially and round the axis. The plate is compliant: a traction p sinks the foot by
+    p h/(2 mu). Here mu is the shear modulus and h the depth of the body behind the foot, the wall for the foot `outer`
+    of a parison. So the contact of the standing ring of a bottle rolls along the plate. On a rigid plate it would hop
+    from point to point.
 
     Args:
         body: mesh of the body, for example `Path.deformed_mesh()`.
@@ -159,11 +161,11 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
         InputError: an argument that is not allowed, or a foot that does not reach the floor.
         ConvergenceError: the run failed before its second state.
 
-    >>> tube = fx.mesh.disc(radius=1.0, inner_radius=0.8, thickness=4.0, elements=(1, 8))
-    >>> found = fx.top_load(tube, material=fx.NeoHookean(c10=1.0), travel=0.3, neck="top", foot="bottom", modes=[1],
-    ...                     step=fx.StepControl(largest=0.2))
-    >>> round(found.largest_force, 2)
-    0.21
+    >>> bottle = fx.mesh.parison(inner_radius=1.0, thickness=0.03, length=2.0, elements=(12, 1))
+    >>> found = fx.top_load(bottle, material=fx.NeoHookean(c10=1.0), travel=0.1, modes=[4],
+    ...                     step=fx.StepControl(largest=0.1))
+    >>> round(found.largest_force, 4)
+    0.0023
     """
     instance("top_load: body", body, Mesh, "a mesh, such as path.deformed_mesh()")
     known("top_load: neck", neck, body.boundaries)
