@@ -9,7 +9,7 @@ from reference.reduced_contact import ReferencePoints
 
 import formingx as fx
 from formingx.contact.gap_closures import crossing, gap_closures
-from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame, frame
+from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame
 from formingx.physics.contact_law import ContactStatus
 from formingx.physics.penalty import Law
 
@@ -108,6 +108,11 @@ def test_the_frame_of_points_is_that_of_array_operations(pulls):
     tool = fx.tools.cup(radius=1.0, depth=1.0, mouth=0.1, fillet=0.2)
     x, force, scale = random.uniform(-0.2, 1.3, (n, 2)), random.normal(size=(n, 2)), random.uniform(1, 2, n)
     k, shift = random.choice([1.0, 50.0], n), random.uniform(0, 0.1, n)
-    laws = [kind(tool, np.inf, k, 1e-2, 1e-3, shift, pulls) for kind in (Law, _Arrays)]
-    for a, b in zip(*(frame(law, x, force, scale) for law in laws), strict=True):
+    frames = []
+    for kind in (Law, _Arrays):
+        law = kind(tool, np.inf, k, 1e-2, 1e-3, shift, pulls)
+        points = Points([SimpleNamespace(comm=MPI.COMM_SELF, points=x, law=law, scale=scale)], 0, 0, None)
+        points._mine, points._rows = points._located([(0, 0, i) for i in range(n)])
+        frames.append(points.tool_frame(x, force))
+    for a, b in zip(*frames, strict=True):
         np.testing.assert_array_equal(a, b)

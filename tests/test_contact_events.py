@@ -182,11 +182,11 @@ def test_anderson_mixing_converges_where_iterations_oscillate():
 
     def piece(x):
         none = np.zeros((0, 2))
-        return _Segment(x[0], [x[None]], [np.zeros((1, 2))], np.zeros(0), none, none, none, none, none, (x, x[1]))
+        return _Segment(x[0], x[None], np.zeros((1, 2)), np.zeros(0), none, none, none, none, none, (x, x[1]))
     starts = [fixed + offset for offset in ([0.1, 0.3], [-0.3, -0.1], [0.2, 0.05])]
     tried = [(piece(x), piece(fixed + grows * (x - fixed))) for x in starts]
     found = ContactEventSequence._anderson_mixture(SimpleNamespace(_comm=MPI.COMM_SELF), tried)
-    np.testing.assert_allclose(found.positions[0][0], fixed, atol=1e-9)
+    np.testing.assert_allclose(found.positions[0], fixed, atol=1e-9)
     np.testing.assert_allclose(found.correction[0], fixed, atol=1e-9)
     np.testing.assert_allclose([found.begins, found.correction[1]], fixed, atol=1e-9)
 

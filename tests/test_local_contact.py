@@ -25,16 +25,16 @@ class Face:
         law = Law(tools.Tool([(0.0, 0.0), (9.0, 0.0)]), np.full(1, np.inf), np.full(1, K), THETA, 1e-3)
         here = np.array([[4.0, -0.5 * THETA]])
         history = law.start(here - [[slip, 0.0]])
-        self.points, self.scale = here, np.ones(1)
+        self.points, self.scale, self.rule = here, np.ones(1), self
         self.increment = Increment(law, history, here)
         self.increment.tractions(here)
         self.increment.linearise(here)
 
-    def add(self, values, forces):
-        values += forces.ravel()
+    def add_unit_forces(self, E, points):
+        E += np.eye(2)
 
     def relative_motion(self, dx, step):
-        return dx.reshape(-1, 2)
+        return dx[None]
 
 
 @pytest.mark.parametrize("coupling", [0.5, 0.6, 0.9])

@@ -366,8 +366,8 @@ class Approach:
         """
         law, lengths = self.face.law, self.face.rule.lengths
         path_length, most = np.linalg.norm(b - a, axis=1), LIMITS.largest_cut * lengths
-        ends = np.maximum(np.maximum(law.distance(a), law.distance(b)), 0.0)
-        between = (law.distance(a) + law.distance(b) + path_length) / 2          # bound of the depth on the path
+        first, last = law.distance(a), law.distance(b)
+        ends, between = np.maximum(np.maximum(first, last), 0.0), (first + last + path_length) / 2    # bound of depths
         far = np.flatnonzero((between > ends + most) & (lengths > 0))
         found = False
         if len(far):

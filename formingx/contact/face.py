@@ -74,6 +74,7 @@ class FaceContact:
         self.enter(0.0, float(contact.driven), True)
         self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the last tangent
         self._guessed: np.ndarray | None = None
+        self._applied: np.ndarray | None = None             # forces in the residual in place of the law, see `apply`
         self._stored: FaceHistory | None = None
         self.start()
 
@@ -107,19 +108,13 @@ class FaceContact:
             self.increment = Increment(self.law, self.history)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the points, shape (n, components), in the units of `values`.
-
-        Args:
-            values: locally owned unknowns, shape (m,).
-        """
+        """Return the displacement of the points in the units of `values`, the locally owned unknowns (`Rule`)."""
         return self.rule.displacement(values)
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the positions of the points relative to the tool in a state.
 
-        Args:
-            fields: locally owned unknowns of the state.
-            control: load parameter (control) of the state, dimensionless.
+        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
 
         Returns:
             Reference position plus displacement minus travel of the tool, shape (n, components), length.
@@ -130,21 +125,20 @@ class FaceContact:
         """Return the displacement of the tool at a load parameter (control), shape (components,), length."""
         return (self._base + self._rate * control) * self._travel_vector
 
-    def relative_motion(self, dx: np.ndarray, step: float) -> np.ndarray:
+    def relative_motion(self, dx: np.ndarray, step: np.ndarray | float) -> np.ndarray:
         """Return the motion of the points relative to the tool in a change of the state, shape (n, components), length.
 
         Args:
-            dx: change of the locally owned unknowns.
-            step: change of the control.
+            dx: change of the locally owned unknowns, shape (m,); several are columns, and the last axis of the result.
+            step: change of the control, a number or shape (k,).
         """
-        return self._length * self.displacement(dx) - self._rate * step * self._travel_vector
+        motion = self._length * self.displacement(dx)
+        return motion - np.multiply.outer(self._rate * self._travel_vector, step) if self._rate else motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
         """Return the contact tractions at the points in a state; at the state last linearised, of the linearised law.
 
-        Args:
-            fields: locally owned unknowns of the state.
-            control: load parameter (control) of the state, dimensionless.
+        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
         """
         return self.increment.tractions(self.positions(fields, control))
 
@@ -181,6 +175,10 @@ class FaceContact:
         """Add dimensionless forces at the points, shape (n, c), to locally owned entries `values` of the residual."""
         self.rule.add(values, forces)
 
+    def apply(self, forces: np.ndarray | None) -> None:
+        """Set dimensionless forces, shape (n, c), that act in the residual in place of the law, except where NaN."""
+        self._applied = forces
+
     def begin(self, old: np.ndarray | None, control: float = 0.0) -> None:
         """Begin an increment: Newton's method starts from an accepted state; collective.
 
@@ -195,8 +193,7 @@ class FaceContact:
 
     def keep_open(self, points: np.ndarray) -> None:
         """Keep some points without contact forces until the next increment begins; points: their mask, shape (n,)."""
-        law: Any = self.law                                  # see `ContactLaw`
-        self.increment = Increment(law.without(points), self.history)
+        self.increment = Increment(self.law.without(points), self.history)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the contact forces in a state to the residual.
@@ -206,7 +203,11 @@ class FaceContact:
             fields: locally owned unknowns of the state.
             control: load parameter (control) of the state, dimensionless.
         """
-        self.add(values, self._scale[:, None] * self.tractions(fields, control).force)
+        force = self._applied
+        if force is None or np.isnan(force).any():
+            of_law = self._scale[:, None] * self.tractions(fields, control).force
+            force = of_law if force is None else np.where(np.isnan(force), of_law, force)
+        self.add(values, force)
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Linearise the contact law for a Newton iteration at a state.

@@ -13,30 +13,32 @@ from .._jit import address, functions
 from ..tools.nearest import SOURCE
 
 _HEADER = """
-void gap_closures(long, const double *, const double *, const double *, long, const double *, double, const double *,
+void gap_closures(long, const double *, const double *, const double *, long, double, double, const double *, long,
                   long, long, const double *, double *);
 double crossing(const double *, const double *, double, double, double, double, long, long, long, const double *);
 """
 
 _SOURCE = SOURCE + r"""
 /* times (n) at which the points x + time w, (n, 2) each, reach the distance -theta + shift from the profile; in the
-   first of the intervals between `at` in which they do. Others keep the value that `times` has on entry */
-void gap_closures(long points, const double *x, const double *w, const double *open, long intervals, const double *at,
-                  double theta, const double *shift, long pieces, long lines, const double *table, double *times)
+   first of the intervals between multiples of `part` in which they do. Others keep the value that `times` has on entry.
+   shift: one value, or with stride 1 (n) */
+void gap_closures(long points, const double *x, const double *w, const double *open, long intervals, double part,
+                  double theta, const double *shift, long stride, long pieces, long lines, const double *table,
+                  double *times)
 {
-    for (long i = 0; i < points; i++, x += 2, w += 2) {
-        double distance, before, now, travel = 1.01 * at[intervals] * sqrt(w[0] * w[0] + w[1] * w[1]);
+    for (long i = 0; i < points; i++, x += 2, w += 2, shift += stride) {
+        double distance, before, now, travel = 1.01 * (part * intervals) * sqrt(w[0] * w[0] + w[1] * w[1]);
         if (!open[i]) continue;
         closest(x, pieces, lines, table, &distance);
-        now = -theta - (distance - shift[i]);
+        now = -theta - (distance - *shift);
         if (!(travel > now)) continue;                                     /* the path is too short */
         for (long k = 0; k < intervals; k++) {
-            double y[2] = {x[0] + at[k + 1] * w[0], x[1] + at[k + 1] * w[1]};
+            double from = part * k, to = part * (k + 1), y[2] = {x[0] + to * w[0], x[1] + to * w[1]};
             before = fmax(now, 0.0);
             closest(y, pieces, lines, table, &distance);
-            now = -theta - (distance - shift[i]);
+            now = -theta - (distance - *shift);
             if (now <= 0) {
-                times[i] = at[k] + (at[k + 1] - at[k]) * (before > 0 ? before / (before - now) : 0.0);
+                times[i] = from + (to - from) * (before > 0 ? before / (before - now) : 0.0);
                 break;
             }
         }
@@ -75,12 +77,13 @@ def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.nda
         Arc length of the first gap closure of each point, shape (n,); `length` for points that stay open or were
         closed.
     """
-    at, times = length / 16 * np.arange(17), np.full(len(start), float(length))
-    if law.profile is not None:
-        shift = np.broadcast_to(law.shift, len(start))
-        _compiled().gap_closures(len(start), address(start), address(velocity), address(free), 16, address(at),
-                                 law.theta, address(shift), *law.profile.compiled_table, address(times))
+    times, profile = np.full(len(start), float(length)), law.profile
+    if profile is not None:
+        _compiled().gap_closures(len(start), address(start), address(velocity), address(free), 16, length / 16,
+                                 law.theta, address(law.shift), np.ndim(law.shift), *profile.compiled_table,
+                                 address(times))
         return times
+    at = length / 16 * np.arange(17)
     travels = 1.01 * length * np.linalg.norm(velocity, axis=1)             # bound of the approach of each point
     near = np.flatnonzero(free & (law.distance(start) + travels > -law.theta))
     if len(near):

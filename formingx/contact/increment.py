@@ -109,13 +109,14 @@ class Increment:
         Returns:
             Tractions of the law, linearised at the predicted distances and slips.
         """
-        return self.law_at(slice(None))(motion)
+        x, predicted = self._now[0], self._predicted_motion(slice(None))
+        return self._law.tractions(x, self._history, None, predicted(motion))
 
-    def law_at(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
+    def law_at(self, points: np.ndarray) -> Callable[[np.ndarray], Tractions]:
         """Return a function that predicts the tractions at some points after a further motion.
 
         Args:
-            points: indices of the points, shape (m,), or a slice.
+            points: indices of the points, shape (m,).
 
         Returns:
             Function of the motion of these points since the last computed tractions, shape (m, c), length. It returns

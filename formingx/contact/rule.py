@@ -48,10 +48,10 @@ class Rule(Protocol):
         """Return the displacement of the contact points; collective.
 
         Args:
-            values: locally owned unknowns, any unit.
+            values: locally owned unknowns, any unit, shape (m,), or several sets as columns, shape (m, k).
 
         Returns:
-            Displacement, shape (n, components), in the unit of `values`.
+            Displacement, shape (n, components) or (n, components, k), in the unit of `values`.
         """
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
@@ -60,6 +60,14 @@ class Rule(Protocol):
         Args:
             values: locally owned entries of the residual, changed in place.
             forces: forces at the points, shape (n, components), in the unit of `values`.
+        """
+
+    def add_unit_forces(self, E: np.ndarray, points: np.ndarray | None) -> None:
+        """Add unit forces at k points, in each component, to columns of the residual; collective.
+
+        Args:
+            E: locally owned entries of the residual, a column for each force, changed in place.
+            points: local numbers of the points, shape (k,); None on a rank that does not own them.
         """
 
     def nodal_stiffness(self, stiffness: np.ndarray) -> np.ndarray:
@@ -103,6 +111,10 @@ class _Nodes:
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
         values[self.dofs] += forces
+
+    def add_unit_forces(self, E: np.ndarray, points: np.ndarray | None) -> None:
+        if points is not None:
+            E[self.dofs[points].ravel(), np.arange(E.shape[1])] += 1.0
 
     def nodal_stiffness(self, stiffness: np.ndarray) -> np.ndarray:
         return stiffness
@@ -283,6 +295,11 @@ class Gauss:
         self.area = self.lumped = self.lengths * self._kinematics.weight(self.points.T)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
+        if values.ndim > 1:
+            found = np.zeros((*self.points.shape, values.shape[1]))
+            for k, column in enumerate(values.T):
+                found[..., k] = self.displacement(column)
+            return found
         return np.einsum("na,nai->ni", self.shapes, self._at_nodes(values))
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
@@ -291,6 +308,13 @@ class Gauss:
         np.add.at(unknowns.array, self.dofs, np.einsum("na,ni->nai", self.shapes, forces).reshape(self.dofs.shape))
         unknowns.scatter_reverse(la.InsertMode.add)
         values[:n] += unknowns.array[:n]
+
+    def add_unit_forces(self, E: np.ndarray, points: np.ndarray | None) -> None:
+        for k, column in enumerate(E.T):
+            forces, (i, way) = np.zeros_like(self.points), divmod(k, self.points.shape[1])
+            if points is not None:
+                forces[points[i], way] = 1.0
+            self.add(column, forces)
 
     def nodal_stiffness(self, stiffness: np.ndarray) -> np.ndarray:
         blocks = np.einsum("na,nb,nij->naibj", self.shapes, self.shapes, stiffness)

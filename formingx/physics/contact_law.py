@@ -332,7 +332,7 @@ class NormalLaw(ContactLaw):
 
     def __init__(self, tool: PlaneTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
         self.tool, self.k, self.theta, self.shift = tool, k, theta, shift
-        self._near: tuple[bytes, Nearest] | None = None     # last positions, and their result
+        self._near: list[tuple[bytes, Nearest]] = []         # last positions and those before, and their results
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
         raise NotImplementedError(f"{type(self).__name__}: ramp(d, bonded): is not defined; a contact law without"
@@ -367,7 +367,7 @@ class NormalLaw(ContactLaw):
     def nearest(self, x: np.ndarray) -> Nearest:
         """Return the geometry of the tool nearest to given positions.
 
-        The last result is stored, for repeated calls with equal x.
+        The last two results are stored, for repeated calls with equal x.
 
         Args:
             x: positions relative to the tool, shape (n, 2), length.
@@ -376,10 +376,13 @@ class NormalLaw(ContactLaw):
             Signed distances less `shift`, unit normals and curvatures of the tool, see `ContactLaw.nearest`.
         """
         positions = x.tobytes()
-        if self._near is None or positions != self._near[0]:
-            near = self.tool.nearest(x)
-            self._near = positions, Nearest(near.distance - self.shift, near.normal, near.curvature)
-        return self._near[1]
+        for known, near in self._near:
+            if known == positions:
+                return near
+        near = self.tool.nearest(x)
+        near = near._replace(distance=near.distance - self.shift)
+        self._near = [(positions, near), *self._near[:1]]
+        return near
 
     def start(self, x: np.ndarray) -> ContactHistory:
         return ContactHistory(x.copy(), self.distance(x), np.zeros(len(x)), x.copy())
@@ -428,7 +431,7 @@ class NormalLaw(ContactLaw):
     def _with(self, **other: Any) -> Self:
         """Return a copy of the law with the attributes in `other` replaced, and without stored results."""
         law = object.__new__(type(self))
-        vars(law).update(vars(self), **other, _near=None)
+        vars(law).update(vars(self), **other, _near=[])
         return law
 
 

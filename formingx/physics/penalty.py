@@ -52,6 +52,7 @@ class Law(NormalLaw):
         self.elastic_slip, self.adhesive = elastic_slip, adhesive
         self._set_friction(mu)
         self._slid: tuple[Nearest, ContactHistory, tuple] | None = None      # last geometry and history, and their slip
+        self._past: tuple[ContactHistory, list] | None = None                # last history, and addresses of its arrays
         self._constants: tuple | None = None
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
@@ -74,7 +75,7 @@ class Law(NormalLaw):
         self.has_history = self.has_friction or self.adhesive
 
     def _with(self, **other: Any) -> Self:
-        return super()._with(_constants=None, **other)
+        return super()._with(_constants=None, _past=None, **other)
 
     def _given(self) -> tuple:
         """Return the constants of the law as arguments of the C function `tractions`, stored for repeated calls."""
@@ -220,7 +221,7 @@ class Law(NormalLaw):
         near, out = self.nearest(x), np.empty(12 * len(x))
         before, g, dg, limit, grows = NULL, NULL, NULL, NULL, NULL
         if old is not None:
-            before = address(old.distance)
+            before = self._addresses(old)[1]
         if self.has_friction:
             assert old is not None
             g, dg = (address(a) for a in self._slip(x, near, old))
@@ -305,9 +306,15 @@ class Law(NormalLaw):
         if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
             g, dg = np.empty(len(x)), np.empty((len(x), 2))
             compiled().elastic_slips(len(x), self.theta, address(x), address(near.normal), address(near.curvature),
-                                     *map(address, old), address(g), address(dg))
+                                     *self._addresses(old), address(g), address(dg))
             self._slid = near, old, (g, dg)
         return self._slid[2]
+
+    def _addresses(self, old: ContactHistory) -> list:
+        """Return the addresses of the arrays of history variables, stored for repeated calls with the same ones."""
+        if self._past is None or self._past[0] is not old:
+            self._past = old, [address(values) for values in old]
+        return self._past[1]
 
 
 def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:

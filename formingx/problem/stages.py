@@ -24,6 +24,7 @@ class _Stage(NamedTuple):
     Attributes:
         setting: the `StepData`.
         active: the active constraints.
+        constrained: locally owned constrained unknowns, shape (n,).
         place: values of the locally owned constrained unknowns at control 0, shape (n,).
         rate: derivative of these values with respect to the control, shape (n,).
         means: prescribed values of the constrained means.
@@ -32,6 +33,7 @@ class _Stage(NamedTuple):
 
     setting: StepData
     active: Active
+    constrained: np.ndarray
     place: np.ndarray
     rate: np.ndarray
     means: list[float]
@@ -83,7 +85,7 @@ class Stages(Vectors):
 
     @property
     def constrained(self) -> np.ndarray:
-        return self._stage.active.dofs[self._stage.active.owned]
+        return self._stage.constrained
 
     @property
     def constrained_rate(self) -> np.ndarray:
@@ -179,9 +181,9 @@ class Stages(Vectors):
             return
         same = before is not None and before.setting.inactive == setting.inactive
         active = before.active if same else self._constraints.active(set(setting.inactive))
-        rate = np.append(setting.rate, 0.0)[active.driver][active.owned]
-        place = x[active.dofs[active.owned]] - rate * control
-        stage = _Stage(setting, active, place, rate, [self._dot(row, x[: self._n]) for row in active.rows])
+        rate, constrained = np.append(setting.rate, 0.0)[active.driver][active.owned], active.dofs[active.owned]
+        stage = _Stage(setting, active, constrained, x[constrained] - rate * control, rate,
+                       [self._dot(row, x[: self._n]) for row in active.rows])
         self._set_stage(stage)
         if setting.fading and control < 1:
             unknowns, unbalanced = self.x.duplicate(), self.x.duplicate()

@@ -80,7 +80,8 @@ class Vectors(Histories):
             x: unknowns, locally owned entries, shape (n,).
         """
         self._fields[: self._n] = x[: self._n]
-        self.forms.w.x.scatter_forward()
+        if self.comm.size > 1:
+            self.forms.w.x.scatter_forward()
         self.forms.refresh()
 
     def stiff_state(self, out: PETSc.Vec) -> None:

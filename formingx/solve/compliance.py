@@ -17,8 +17,9 @@ Border: TypeAlias = Callable[[Array], Array]
 """Function that maps solutions V = K^-1 E, shape (n, m), to the bordered system, in place; it returns the changes of
 the control, shape (m,)."""
 
-Moved: TypeAlias = Callable[[Array, float], Array]
-"""Linear function of an update of the unknowns, shape (n,), and of the control; it returns motions, shape (k,)."""
+Moved: TypeAlias = Callable[[Array, Array | float], Array]
+"""Linear function of an update of the unknowns, shape (n,), and of the control; it returns motions, shape (k,). Several
+updates are columns: it maps the shapes (n, m) and (m,) to (k, m)."""
 
 
 @dataclass(frozen=True)
@@ -77,7 +78,7 @@ class Columns:
         Args:
             moved: function that returns k motions for an update of unknowns and control (`Moved`).
         """
-        return np.array([moved(column, step) for column, step in zip(self._values.T, self.steps)]).T
+        return moved(self._values, self.steps)
 
     def update(self, forces: Array) -> tuple[Array, float]:
         """Return the updates of unknowns and control for a linear combination of the right-hand sides.
@@ -131,11 +132,9 @@ class CondensedColumns:
         Args:
             moved: function that returns k motions for an update of unknowns and control (`Moved`).
         """
-        x, found = np.zeros(self._border.b.getLocalSize()), []
-        for column in self._found.T:
-            x[self._rows] = column
-            found.append(moved(x, 0.0))
-        return np.array(found).T + np.outer(moved(self._border.b.array_r, 1.0), self.steps)
+        V = np.zeros((self._border.b.getLocalSize(), self._found.shape[1]))
+        V[self._rows] = self._found
+        return moved(V, np.zeros(V.shape[1])) + np.outer(moved(self._border.b.array_r, 1.0), self.steps)
 
     def update(self, forces: Array) -> tuple[Array, float]:
         """Return the updates of unknowns and control for a linear combination of the right-hand sides.

@@ -118,7 +118,7 @@ class Increment(Protocol):
     def predicted(self, motion: Array) -> Tractions:
         """Return the tractions at all points after a motion relative to their tool, shape (n, c), length."""
 
-    def law_at(self, points: Array | slice) -> Callable[[Array], Tractions]:
+    def law_at(self, points: Array) -> Callable[[Array], Tractions]:
         """Return a function that maps motions of m points relative to their tool, shape (m, c), length, to tractions.
         """
 
@@ -138,9 +138,11 @@ class ContactFace(Protocol):
 
     Attributes:
         points: reference positions of the contact points, shape (n, c).
+        rule: quadrature rule of the face (`formingx.contact.rule.Rule`).
     """
 
     points: Array
+    rule: Any
 
     @property
     def increment(self) -> Increment:
@@ -150,16 +152,13 @@ class ContactFace(Protocol):
     def scale(self) -> Array:
         """Factor from the traction of each point to its forces in F, shape (n,), 1/stress."""
 
-    def add(self, values: Array, forces: Array) -> None:
-        """Add forces at the points, shape (n, c), to `values`, the locally owned entries of F."""
+    def apply(self, forces: Array | None) -> None:
+        """Set contact forces that act in F in place of the contact law, shape (n, c); None: the law acts."""
 
-    def keep_open(self, points: Array) -> None:
-        """Keep the points of a mask, shape (n,), open until the next `ActiveSet.begin`."""
-
-    def relative_motion(self, dx: Array, step: float) -> Array:
+    def relative_motion(self, dx: Array, step: Array | float) -> Array:
         """Return the motion of the points relative to their tool, shape (points, c), length, in an update.
 
-        dx: update of the unknowns, locally owned entries. step: update of the control, which moves the tool.
+        dx: update of the unknowns, locally owned entries; several are columns. step: update of the control.
         """
 
 

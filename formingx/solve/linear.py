@@ -195,10 +195,10 @@ class DirectSolver:
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
         """Return two dense matrices, for right-hand sides and solutions, with n locally owned rows and m columns.
 
-        The matrices of a single column, and those of the last other width, are used again.
+        The matrices of one and of two columns, and those of the last other width, are used again.
         """
         if m not in self._columns:
-            for other in [width for width in self._columns if width > 1]:
+            for other in [width for width in self._columns if width > 2]:
                 self._forget(other)
             self._columns[m] = [PETSc.Mat().createDense(((n, None), (None, m)), comm=self._matrix.comm)
                                 for _ in range(2)]

@@ -22,7 +22,7 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..ranks import gathered
+from ..ranks import combined, gathered, listed
 from .compliance import Border, columns
 from .equations import Array, ContactFace, Equations
 from .linear import DirectSolver
@@ -106,7 +106,7 @@ class LocalSolve:
         """
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]
-            points = self._problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
+            points = combined(self._problem.comm, sum(map(len, chosen)), MPI.SUM)
             if not 0 < points <= _LOCAL.most_points:
                 return step
             small = _Points(self._problem, self._contacts, chosen, solver, border)
@@ -133,7 +133,7 @@ class LocalSolve:
             mark |= new
             found |= bool(new.any())
             contact.increment.expect(mark, law.sense)
-        return self._problem.comm.allreduce(found, MPI.LOR)
+        return bool(combined(self._problem.comm, found, MPI.LOR))
 
 
 Update: TypeAlias = Callable[[Array, float], "Array | None"]
@@ -154,7 +154,7 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
         costs less.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
-    points = problem.comm.allreduce(sum(map(len, chosen)), MPI.SUM)
+    points = combined(problem.comm, sum(map(len, chosen)), MPI.SUM)
     if points > _LOCAL.few_changes:
         return None
     if not points:
@@ -176,20 +176,13 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
         Locally owned rows, shape (n, m), 0 at constrained unknowns. The m columns run over ranks, points and
         components.
     """
-    unit, components = np.zeros(problem.x.getLocalSize()), contacts[0].points.shape[1]
-    own = [(c, point, way) for c, points in zip(contacts, chosen) for point in points for way in range(components)]
-    units = []
-    for rank, count in enumerate(problem.comm.allgather(len(own))):
-        for k in range(count):
-            mine, point, way = own[k] if rank == problem.comm.rank else (None, 0, 0)
-            for contact in contacts:                        # on all ranks: the force may act on another rank's nodes
-                forces = np.zeros_like(contact.points)
-                if contact is mine:
-                    forces[point, way] = 1.0
-                contact.add(unit, forces)
-            units.append(unit.copy())
-            unit[:] = 0
-    E = np.array(units).reshape(-1, len(unit)).T
+    comm, components = problem.comm, contacts[0].points.shape[1]
+    counts = listed(comm, [len(points) * components for points in chosen])
+    E, end = np.zeros((problem.x.getLocalSize(), sum(map(sum, counts)))), 0
+    for rank, of_faces in enumerate(counts):
+        for contact, points, count in zip(contacts, chosen, of_faces):
+            first, end = end, end + count
+            contact.rule.add_unit_forces(E[:, first:end], points if rank == comm.rank else None)
     E[problem.constrained] = 0
     return E
 
@@ -213,7 +206,7 @@ class _Points:
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
         self._c = contacts[0].points.shape[1]               # number of components
         self._some = [(c, i) for c, i in zip(contacts, chosen) if len(i)]
-        counts = self._comm.allgather(self._c * sum(map(len, chosen)))
+        counts = listed(self._comm, self._c * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
         ends = np.cumsum([0, *(len(i) for _, i in self._some)])
@@ -221,8 +214,7 @@ class _Points:
         self._columns = columns(solver, unit_forces(problem, contacts, chosen), border)
         scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
-        motions = self._columns.motions(self._moved).reshape(counts[self._comm.rank], len(self._columns.steps))
-        self._C = self._gather(motions) * self._scale
+        self._C = self._gather(self._columns.motions(self._moved)) * self._scale
 
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
         """Solve the contact law at the points, together with their compliance, for a Newton update.
@@ -236,7 +228,7 @@ class _Points:
         """
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._linearised()
-        laws, ramps = [c.increment.law_at(i) for c, i in self._some], [c.increment.in_ramp(i) for c, i in self._some]
+        laws, ramps = [c.increment.law_at(i) for c, i in self._some], list[Any]()
         y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
         accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
@@ -256,6 +248,7 @@ class _Points:
                 return None
             new = y - correction
             if k >= _LOCAL.full_corrections:
+                ramps = ramps or [c.increment.in_ramp(i) for c, i in self._some]
                 new, keep = self._stop_at_edge(ramps, y, new, entry_depth)
                 halvings = 0 if keep else _LOCAL.most_halvings
             y, dy = new, new - y
@@ -300,7 +293,7 @@ class _Points:
             The updated solutions, shape (n, m), or None if the changed tangent is singular.
         """
         added = self._gather(np.concatenate(changes))
-        y = self._with_added_stiffness(added, self._gather(np.array([self._moved(column, step) for column in V.T]).T))
+        y = self._with_added_stiffness(added, self._gather(self._moved(V, np.full(V.shape[1], step))))
         if y is None:
             return None
         forces = np.einsum("nij,njm->nim", added, y.reshape(len(added), self._c, -1)).reshape(y.shape)
@@ -319,12 +312,14 @@ class _Points:
             return None
         return found if np.isfinite(found).all() else None
 
-    def _moved(self, dx: Array, step: float) -> Array:
+    def _moved(self, dx: Array, step: Array | float) -> Array:
         """Return the motion of locally owned points relative to their tools, flat, length; collective.
 
-        dx: update of the locally owned unknowns, shape (n,). step: update of the control.
+        dx: update of the locally owned unknowns, shape (n,). step: update of the control. Several updates are columns
+        of dx, shape (n, k), and of the result.
         """
-        return np.concatenate([c.relative_motion(dx, step)[i].ravel() for c, i in zip(self._contacts, self._chosen)])
+        motions = (c.relative_motion(dx, step)[i] for c, i in zip(self._contacts, self._chosen))
+        return np.concatenate([motion.reshape(-1, *dx.shape[1:]) for motion in motions])
 
     def _linearised(self) -> tuple[Array, Array]:
         """Return the forces, flat, and stiffnesses, shape (k, c, c), of the points in the last linearised contact law.
@@ -362,4 +357,4 @@ class _Points:
 
     def _gather(self, values: Array) -> Array:
         """Return locally owned values of all ranks, concatenated in the order of the ranks."""
-        return gathered(self._comm, values)
+        return values if self._comm.size == 1 else gathered(self._comm, values)

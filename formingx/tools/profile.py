@@ -50,6 +50,10 @@ class Tool:
             profile have none, except on R = 0 (the tip of a cone).
         closed: True to join the last point to the first.
 
+    Attributes:
+        table: lines, then arcs of the profile, shape (pieces, 9), as `formingx.tools.nearest.nearest` takes them.
+        lines: number of lines.
+
     Raises:
         InputError: fewer than two different points, a fillet without a corner or too large for it, or a profile that
             crosses itself.
@@ -144,12 +148,12 @@ class Tool:
         Returns:
             Distances, positive inside the tool; gradients; curvatures (`Nearest`).
         """
-        return Nearest(*nearest(as_points("Tool: x", x), self._table, self._lines))
+        return Nearest(*nearest(as_points("Tool: x", x), self.table, self.lines))
 
     @property
     def compiled_table(self) -> tuple[int, int, Any]:
         """Number of all pieces, number of lines, and address of the table of the pieces (`nearest`), for C."""
-        return len(self._table), self._lines, address(self._table)
+        return len(self.table), self.lines, address(self.table)
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
         """Return the tool shifted in its plane.
@@ -243,8 +247,8 @@ class Tool:
         corners += [end for end in ends if end is not None]
         arcs += [(*c, 0.0, 0.0, math.copysign(1.0, turn), 0.0, math.inf, 0.0, 0.0)
                  for c, turn in corners if abs(turn) > FLAT]
-        self._lines = len(rows)
-        self._table = np.array([(*row, 0.0, 0.0) for row in rows] + arcs)
+        self.lines = len(rows)
+        self.table = np.array([(*row, 0.0, 0.0) for row in rows] + arcs)
 
     def _ends(self) -> tuple:
         """Return the corners that the profile and its mirror image form on R = 0, at the first and the last end.

@@ -19,8 +19,7 @@ int forces_at_end({_POINTS}, const double *, const double *, const double *, con
                   const double *, const double *, double *, double *);
 int rates({_POINTS}, const double *, const double *, const long *, const double *, long *, double *, double *);
 double change({_POINTS}, const long *, const double *, const double *, const double *, long *);
-void frame(long, const double *, const double *, const double *, const double *, double, long, const double *, long,
-           long, const double *, double *, double *, double *);
+void frame(long, const double *, const long *, const double *, const double *, const long *, const double *, double *);
 """
 
 _SOURCE = SOURCE + r"""
@@ -318,19 +317,27 @@ double change(long m, const double *friction, const double *pulls, const double 
     return first;
 }
 
-/* normal (m, 2) and curvature (m) of the profile closest to points x (m, 2), and `beyond` (m): the distance at which
-   the normal part N of the force (m, 2) acts, `Law.depth`, less the distance of x, which is reduced by `shift` (m).
-   scale (m): N over the normal traction; k (m): penalty */
-void frame(long m, const double *x, const double *force, const double *scale, const double *k, double theta,
-           long pulls, const double *shift, long pieces, long lines, const double *table, double *normal,
-           double *curvature, double *beyond)
+enum {FRICTION, ELASTIC_SLIP, PULLS, SCALE, THETA, SHIFT, PENALTY, PROPERTIES};       /* columns of properties */
+
+/* in `out` for m points the normal (m, 2), the tangent (m, 2) and the curvature (m) of the profile closest to them, and
+   the distance (m) at which the normal part N of their force (m, 2) acts, `Law.depth`, less their distance, which is
+   reduced by `shift`. The points are `rows` (m) of positions (n, 2), of properties (n, 7) and of ranges (n, 3): first
+   piece in the table, number of pieces, of lines. scale: N over the normal traction */
+void frame(long m, const double *positions, const long *rows, const double *force, const double *properties,
+           const long *ranges, const double *table, double *out)
 {
     for (long i = 0; i < m; i++) {
-        double distance, *n = normal + 2 * i;
-        nearest(1, x + 2 * i, pieces, lines, table, &distance, n, curvature + i);
-        double N = (force[2 * i] * n[0] + force[2 * i + 1] * n[1]) / scale[i];
-        double over = (pulls ? N : fmax(N, 0.0)) / (k[i] * theta);
-        beyond[i] = theta * (pulls || over > 1 ? over - pulls : 2 * sqrt(over) - 1) - (distance - shift[i]);
+        const double *p = properties + rows[i] * PROPERTIES, *f = force + 2 * i;
+        const long *range = ranges + 3 * rows[i];
+        double distance, *n = out + 2 * i, *t = n + 2 * m;
+        nearest(1, positions + 2 * rows[i], range[1], range[2], table + range[0] * COLUMNS, &distance, n,
+                out + 4 * m + i);
+        double N = (f[0] * n[0] + f[1] * n[1]) / p[SCALE], theta = p[THETA];
+        double over = (p[PULLS] > 0 ? N : fmax(N, 0.0)) / (p[PENALTY] * theta);
+        double depth = theta * (p[PULLS] > 0 ? over - 1 : over > 1 ? over : 2 * sqrt(over) - 1);
+        t[0] = -n[1];
+        t[1] = n[0];
+        out[5 * m + i] = depth - (distance - p[SHIFT]);
     }
 }
 """

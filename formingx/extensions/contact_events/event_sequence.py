@@ -66,8 +66,8 @@ class _Segment(NamedTuple):
 
     Attributes:
         begins: arc length at the start of the segment, from the accepted state.
-        positions: for each face, positions of all points relative to the tool at the start, shape (n, 2), length.
-        speed: for each face, derivatives of the positions with respect to arc length, shape (n, 2), length.
+        positions: positions of the n points of all faces relative to their tools at the start, shape (n, 2), length.
+        speed: derivatives of the positions with respect to arc length, shape (n, 2), length.
         status: contact statuses, shape (m,).
         place: sticking positions, shape (m, 2), length.
         force: contact forces in F at the start, shape (m, 2), dimensionless.
@@ -78,8 +78,8 @@ class _Segment(NamedTuple):
     """
 
     begins: float
-    positions: list[np.ndarray]
-    speed: list[np.ndarray]
+    positions: np.ndarray
+    speed: np.ndarray
     status: np.ndarray
     place: np.ndarray
     force: np.ndarray
@@ -91,8 +91,9 @@ class _Segment(NamedTuple):
     def after(self, time: float) -> _Segment:
         """Return the remaining segment, which starts at the arc length `time`."""
         ds = time - self.begins
-        return self._replace(begins=time, positions=[x + ds * w for x, w in zip(self.positions, self.speed)],
-                             force=self.force + ds * self.rate, extra=self.extra + ds * self.growth)
+        return self if ds == 0 else self._replace(begins=time, positions=self.positions + ds * self.speed,
+                                                  force=self.force + ds * self.rate,
+                                                  extra=self.extra + ds * self.growth)
 
     def extended(self, m: int) -> _Segment:
         """Return this segment of the path with forces and statuses for m points (`Points`); added points are open."""
@@ -126,17 +127,17 @@ class ContactEventSequence:
                  response: Response, batch: int):
         self._faces, self._response, self._comm, self._batch = faces, response, faces[0].comm, batch
         self._n, self._tangent = n, (x, control, direction, slope)
-        start = [face.positions(x[:n], control) for face in faces]
-        self._along = [face.relative_motion(direction[:n], slope) for face in faces]
-        self._free = [~face.law.touching(x, face.history) & (face.rule.area > 0) for face, x in zip(faces, start)]
-        self.touching = [int(combined(self._comm, int(np.sum(~free & (face.rule.area > 0))), MPI.SUM))
-                         for face, free in zip(faces, self._free)]
-        self._sticks = [np.broadcast_to(face.law.friction == np.inf, len(x)) for face, x in zip(faces, start)]
-        self._closures: list[GapClosure] = []
         self._points = Points(faces, n, len(x), response)
+        start = [face.positions(x[:n], control) for face in faces]
+        self._along = np.concatenate([face.relative_motion(direction[:n], slope) for face in faces])
+        self._area = np.concatenate([face.rule.area for face in faces]) > 0
+        self._free = self._area & ~np.concatenate([face.law.touching(x, face.history) for face, x in zip(faces, start)])
+        self.touching = [int(combined(self._comm, int(np.sum(closed)), MPI.SUM))
+                         for closed in self._points.of_faces(self._area & ~self._free)]
+        self._closures: list[GapClosure] = []
         blank = np.zeros((0, start[0].shape[1]))
-        self._pieces = [_Segment(0.0, start, self._along, np.zeros(0, dtype=int), blank, blank, blank, blank, blank,
-                                 (np.zeros(len(x)), 0.0))]
+        self._pieces = [_Segment(0.0, np.concatenate(start), self._along, np.zeros(0, dtype=int), blank, blank, blank,
+                                 blank, blank, (np.zeros(len(x)), 0.0))]
         self._end: _Segment | None = None                     # end of the last segment, in equilibrium
         self._taken = self._work = 0                        # closures with a contact force; see `EventSettings.work`
         self.ends, self.stops = np.inf, False
@@ -179,20 +180,20 @@ class ContactEventSequence:
             carry a predicted contact force at `length`, shape (n,). Derivatives of the positions with respect to arc
             length before the closure, shape (n, 2); 0 for other points.
         """
-        piece = self._piece(length)
-        times, positions = [np.full(len(x), length) for x in piece.positions], piece.after(length).positions
-        speeds, sure = [np.zeros_like(x) for x in positions], [np.zeros(len(x), dtype=bool) for x in positions]
+        piece, points = self._piece(length), self._points
+        times, positions = np.full(len(piece.positions), length), piece.after(length).positions.copy()
+        speeds, sure = np.zeros_like(positions), np.zeros(len(positions), dtype=bool)
         for closure in self._closures:
-            f, i, time = closure.face, closure.point, closure.time
+            time, i = closure.time, points.row(closure)
             if time < length and closure.rank == self._comm.rank:
-                times[f][i], positions[f][i], speeds[f][i] = time, closure.place, self._piece(time).speed[f][i]
-        self._points.spread(piece.extended(len(self._points.point_ids)).status != ContactStatus.FREE, sure)
-        return times, positions, sure, speeds
+                times[i], positions[i], speeds[i] = time, closure.place, self._piece(time).speed[i]
+        points.spread(piece.extended(len(points.point_ids)).status != ContactStatus.FREE, sure)
+        return tuple(points.of_faces(values) for values in (times, positions, sure, speeds))
 
     def positions(self, length: float) -> list[np.ndarray]:
         """Return for each face the positions of its owned points relative to the tool at an arc length, shape (n, 2).
         """
-        return self._piece(length).after(length).positions
+        return self._points.of_faces(self._piece(length).after(length).positions)
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
         """Return the deviation (x, control) of the predicted path from the tangent at an arc length; None if it is 0.
@@ -210,17 +211,17 @@ class ContactEventSequence:
         return (piece.correction[0] - self._points.columns @ piece.extra.ravel(),
                 piece.correction[1] - float(self._points.steps @ piece.extra.ravel()))
 
-    def _projected(self, piece: _Segment, moved: Sequence[np.ndarray] = ()) -> _Segment:
+    def _projected(self, piece: _Segment, moved: np.ndarray | None = None) -> _Segment:
         """Return a segment at whose start closed points are projected onto their tools or sticking positions.
 
-        Curved tools need a few projections. moved: for each face, motion of its points before it, shape (n, 2), length.
+        Curved tools need a few projections. moved: motion of the n points before it, shape (n, 2), length.
         """
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
-        u = points.values_at(moved) if moved else np.zeros_like(piece.force)
+        u = np.zeros(piece.force.shape) if moved is None else points.values_at(moved)
         targets = points.motion_to_targets(piece.positions, piece.place, near)
         force, added = points.forces_at_end(u, piece.status, near, piece.force, targets)
-        positions = [x - points.motion_under(added, f) for f, x in enumerate(piece.positions)]
-        return piece._replace(positions=[x + m for x, m in zip(positions, moved)] if moved else positions, force=force,
+        positions = piece.positions - points.motion_under(added)
+        return piece._replace(positions=positions if moved is None else positions + moved, force=force,
                               extra=piece.extra + added)
 
     def _piece(self, length: float) -> _Segment:
@@ -230,19 +231,19 @@ class ContactEventSequence:
     def _free_sliding(self) -> bool:
         """Make the contact forces of points that slide at the accepted state unknowns; return False if this fails."""
         x, control = self._tangent[:2]
-        slide = [~free & (face.rule.area > 0) & (face.law.friction < np.inf)
-                 for face, free in zip(self._faces, self._free)]
-        if not 0 < combined(self._comm, sum(int(np.sum(s)) for s in slide), MPI.SUM) <= _SETTINGS.sliding_points:
+        points = self._points
+        slide = self._area & ~self._free & ~points.sticks
+        if not 0 < combined(self._comm, int(np.sum(slide)), MPI.SUM) <= _SETTINGS.sliding_points:
             return True
-        if not self._points.learn([np.flatnonzero(s) for s in slide], touched=True):
+        if not points.learn([np.flatnonzero(s) for s in points.of_faces(slide)], touched=True):
             return False
         found = [face.tractions(x[: self._n], control) for face in self._faces]
-        force = self._points.values_at([face.scale[:, None] * t.force for face, t in zip(self._faces, found)])
-        status = self._points.values_at([t.sense for t in found]).astype(int)
-        status[self._points.friction == 0] = ContactStatus.SLIDES
-        slip = self._points.values_at([np.zeros(len(face.points)) if face.history is None else face.history.slip
-                                       for face in self._faces])
-        piece, points = self._pieces[0].extended(len(status)), self._points
+        force = points.values_at(np.concatenate([face.scale[:, None] * t.force for face, t in zip(self._faces, found)]))
+        status = points.values_at(np.concatenate([t.sense for t in found])).astype(int)
+        status[points.friction == 0] = ContactStatus.SLIDES
+        slip = points.values_at(np.concatenate([
+            np.zeros(len(face.points)) if face.history is None else face.history.slip for face in self._faces]))
+        piece = self._pieces[0].extended(len(status))
         place = points.values_at(piece.positions) - slip[:, None] * points.tool_frame(piece.positions, force).tangent
         if not self._append(piece._replace(status=status, force=force, place=place), status):
             return False
@@ -262,7 +263,7 @@ class ContactEventSequence:
         piece = piece._replace(
             place=np.where(stuck[:, None], points.values_at(piece.positions) - slip, piece.place), status=status,
             rate=rate, growth=growth, force=np.where((status == ContactStatus.FREE)[:, None], 0.0, piece.force),
-            speed=[w - points.motion_under(growth, f) for f, w in enumerate(self._along)])
+            speed=self._along - points.motion_under(growth))
         points.spread(status == ContactStatus.FREE, self._free)
         self._pieces.append(piece)
         return True
@@ -287,9 +288,8 @@ class ContactEventSequence:
             last = self._pieces[-1]
             if last.begins >= length or self.exhausted:
                 return False
-            times = [gap_closures(face.law, x, w, free, length - last.begins)
-                     for face, x, w, free in zip(self._faces, last.positions, last.speed, self._free)]
-            first = min(listed(self._comm, min((float(t.min(initial=np.inf)) for t in times), default=np.inf)))
+            times = self._gap_closures(last, length - last.begins)
+            first = min(listed(self._comm, float(times.min(initial=np.inf))))
             frame = self._points.tool_frame(last.positions, last.force)
             after, status = self._points.change(last.status, frame, last.force, last.rate)
             if not after < min(first, length - last.begins):
@@ -297,29 +297,35 @@ class ContactEventSequence:
             if not self._append(last.after(last.begins + after), status):
                 self.ends, self.stops = last.begins + after, True
                 return False
-        if self._store_first([last.begins + t for t in times], length, last):
+        if self._store_first(last.begins + times, length, last):
             return True
         self._end = self._iterated(length, last)
         return self._end is not None and self._store_first(self._missed(self._end, last), length, last)
 
-    def _store_first(self, times: list[np.ndarray], length: float, segment: _Segment) -> bool:
-        """Store the earliest closure before `length`; return False if there is none. times: arc lengths, by face."""
-        best = min(((float(t.min()), self._comm.rank, f, int(np.argmin(t))) for f, t in enumerate(times) if len(t)),
-                   default=(length, 0, 0, 0))
+    def _gap_closures(self, segment: _Segment, length: float) -> np.ndarray:
+        """Return the arc lengths from the start of a segment at which the n points close, shape (n,); else `length`."""
+        parts = zip(self._faces, *map(self._points.of_faces, (segment.positions, segment.speed, self._free)))
+        return np.concatenate([gap_closures(face.law, x, w, free, length) for face, x, w, free in parts])
+
+    def _store_first(self, times: np.ndarray, length: float, segment: _Segment) -> bool:
+        """Store the earliest closure before `length`; return False if there is none. times: arc lengths, shape (n,)."""
+        k = int(np.argmin(times)) if len(times) else 0
+        best = (float(times[k]), self._comm.rank, *self._points.face_and_point(k)) if len(times) else (length, 0, 0, 0)
         time, rank, f, i = min(listed(self._comm, best))
         if not time < length:
             return False
         self._closures.append(self._closure(rank, f, i, time, segment.after(time).positions))
         return True
 
-    def _closure(self, rank: int, f: int, i: int, time: float, positions: list[np.ndarray]) -> GapClosure:
+    def _closure(self, rank: int, f: int, i: int, time: float, positions: np.ndarray) -> GapClosure:
         """Return the gap closure of point i of face f near the arc length `time`, with `positions` there."""
         closure: Any = None
         if rank == self._comm.rank:
-            face, x, w = self._faces[f], positions[f][i], self._pieces[-1].speed[f][i]
+            face, row = self._faces[f], self._points.starts[f] + i
+            x, w = positions[row], self._pieces[-1].speed[row]
             ds = crossing(face.law, i, x, w, self._pieces[-1].begins - time, _SETTINGS.sticking, _SETTINGS.to_surface)
             closure = GapClosure(time + ds, rank, f, i, x + ds * w, float(face.rule.lengths[i]),
-                                 bool(self._sticks[f][i]))
+                                 bool(self._points.sticks[row]))
         return closure if self._comm.size == 1 else self._comm.bcast(closure, root=rank)
 
     def _equilibrate(self, length: float) -> bool:
@@ -354,17 +360,18 @@ class ContactEventSequence:
                 tried = []
         return False
 
-    def _missed(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> list[np.ndarray]:
-        """Return for each face the arc lengths at which open points passed the tool's surface, if inside it at `end`.
+    def _missed(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> np.ndarray:
+        """Return the arc lengths at which open points passed the tool's surface, if inside it at `end`, shape (n,).
 
         For other points, and for the point of the closure `but`, the result is the arc length of `end`.
         """
-        times = [np.full(len(free), end.begins) for free in self._free]
-        for f, (t, face, x, w, free) in enumerate(zip(times, self._faces, end.positions, last.speed, self._free)):
+        times, free = np.full(len(self._free), end.begins), self._free.copy()
+        if but and but.rank == self._comm.rank:
+            free[self._points.row(but)] = False
+        parts = map(self._points.of_faces, (times, end.positions, last.speed, free))
+        for face, t, x, w, candidates in zip(self._faces, *parts):
             near = face.law.nearest(x)
-            inside = free & (near.distance > -face.law.theta)
-            if but and (but.rank, but.face) == (self._comm.rank, f):
-                inside[but.point] = False
+            inside = candidates & (near.distance > -face.law.theta)
             if not inside.any():
                 continue
             rate = np.einsum("ni,ni->n", near.normal, w)
@@ -378,8 +385,7 @@ class ContactEventSequence:
 
         tried: pairs (segment before an iteration, segment after it).
         """
-        changes = np.array([np.concatenate([(b - a).ravel() for a, b in zip(x.positions, y.positions)])
-                            for x, y in tried])
+        changes = np.array([(after.positions - before.positions).ravel() for before, after in tried])
         gram = combined(self._comm, changes @ changes.T)
         if not gram.trace() < FAR:
             return None
@@ -394,7 +400,7 @@ class ContactEventSequence:
             return sum(w * v for w, v in zip(weights, values))
         return after[-1]._replace(
             begins=float(mean([p.begins for p in after])), force=mean([p.force for p in after]),
-            positions=[mean(list(x)) for x in zip(*(p.positions for p in after))], extra=mean([p.extra for p in after]),
+            positions=mean([p.positions for p in after]), extra=mean([p.extra for p in after]),
             correction=(mean([p.correction[0] for p in after]), float(mean([p.correction[1] for p in after]))))
 
     def _iterated(self, time: float, piece: _Segment) -> _Segment | None:
@@ -402,14 +408,16 @@ class ContactEventSequence:
         piece, points = piece.extended(len(self._points.point_ids)).after(time), self._points
         x, control, direction, slope = self._tangent
         self._work += 1
-        forces = [np.where(free[:, None], 0.0, np.full_like(y, np.nan)) for free, y in zip(self._free, piece.positions)]
+        forces = np.full(piece.positions.shape, np.nan)
+        forces[self._free] = 0.0
         points.spread(piece.force, forces)
         change = self._response.to_equilibrium(
             x + time * direction + piece.correction[0] - points.columns @ piece.extra.ravel(),
-            control + time * slope + piece.correction[1] - float(points.steps @ piece.extra.ravel()), forces)
+            control + time * slope + piece.correction[1] - float(points.steps @ piece.extra.ravel()),
+            points.of_faces(forces))
         if change is None:
             return None
-        moved = [face.relative_motion(change[0][: self._n], change[1]) for face in self._faces]
+        moved = np.concatenate([face.relative_motion(change[0][: self._n], change[1]) for face in self._faces])
         piece = self._projected(piece, moved)
         if not np.isfinite(piece.extra).all():
             return None
@@ -417,13 +425,13 @@ class ContactEventSequence:
 
     def _learn(self, length: float) -> bool:
         """Compute the compliance at the points of the last and of likely next closures; False without LU factors."""
-        last, closure, chosen = self._pieces[-1], self._closures[-1], []
+        last, closure, points, chosen = self._pieces[-1], self._closures[-1], self._points, []
         left = length - last.begins
-        for f, face in enumerate(self._faces):
-            times = gap_closures(face.law, last.positions[f], last.speed[f], self._free[f], left)
-            times[[i for rank, g, i in self._points.point_ids if (rank, g) == (self._comm.rank, f)]] = left
-            if (closure.rank, closure.face) == (self._comm.rank, f):
-                times[closure.point] = -1.0
-            first = np.argsort(times, kind="stable")[: self._batch]
-            chosen.append(np.sort(first[times[first] < left]))
-        return self._points.learn(chosen)
+        times = self._gap_closures(last, left)
+        points.spread(np.full(len(points.point_ids), left), times)
+        if closure.rank == self._comm.rank:
+            times[points.row(closure)] = -1.0
+        for of_face in points.of_faces(times):
+            first = np.argsort(of_face, kind="stable")[: self._batch]
+            chosen.append(np.sort(first[of_face[first] < left]))
+        return points.learn(chosen)

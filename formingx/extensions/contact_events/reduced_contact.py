@@ -16,8 +16,11 @@ with the normal n into the tool and its tangent t: the geometric stiffness of co
 
 from __future__ import annotations
 
+import bisect
+import itertools
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,6 +30,7 @@ from ..._jit import address, address_of_integers
 from ...physics.contact_law import FAR, ContactStatus
 from ...ranks import combined, listed
 from .compiled_contact import compiled
+from .gap_closure import GapClosure
 from .response import Response
 
 
@@ -85,7 +89,8 @@ class Points:
         point_ids: (rank, face, point) of each of the m points.
         columns: changes of x under these unit forces, locally owned rows, shape (size, 2 m).
         steps: changes of the control under these forces, shape (2 m,).
-        motions: for each face, motion of its owned points under these forces, shape (points, 2, 2 m), length.
+        motions: motions of the n owned points of all faces under these forces, shape (n, 2, 2 m), length.
+        starts: number of the first of these n points of each face, and n, shape (faces + 1,).
         friction: coefficient of friction, infinite for stick, shape (m,).
         elastic_slip: elastic slip at which a point begins to slide, shape (m,), length.
     """
@@ -96,10 +101,11 @@ class Points:
         self.point_ids: list[tuple[int, int, int]] = []
         self.columns, self.steps = np.zeros((size, 0)), empty
         c = faces[0].points.shape[1]
-        self.motions = [np.zeros((*face.points.shape, 0)) for face in faces]
-        self.friction, self.elastic_slip, self._scale, self._pulls = empty, empty, empty, empty.astype(bool)
+        self.starts = [0, *np.cumsum([len(face.points) for face in faces]).tolist()]
+        self.motions = np.zeros((self.starts[-1], c, 0))
+        self.friction, self.elastic_slip, self._pulls = empty, empty, empty.astype(bool)
         self._S, self._C = np.zeros((0, c, c)), np.zeros((0, 0))
-        self._owned: list[tuple[int, np.ndarray, np.ndarray, Any]] = []
+        self._mine, self._rows = self._located([])
 
     def learn(self, chosen: list[np.ndarray], touched: bool = False) -> bool:
         """Add contact points, and solve for their compliance with the stored LU factors.
@@ -116,66 +122,82 @@ class Points:
             return False
         new = [point for rank in listed(self._comm, [(self._comm.rank, f, int(i)) for f, numbers in enumerate(chosen)
                                                      for i in numbers]) for point in rank]
-        self.point_ids += new
-        self._owned = [(f, k, i, self._faces[f].law.part(i)) for f, k, i in self._of_faces(self.point_ids)]
+        old, self.point_ids = len(self.point_ids), self.point_ids + new
+        self._mine, self._rows = self._located(self.point_ids)
         self.columns, self.steps = np.column_stack([self.columns, found[0]]), np.append(self.steps, found[1])
-        for f, face in enumerate(self._faces):
-            motions = [face.relative_motion(column[: self._n], step)[..., None]
-                       for column, step in zip(found[0].T, found[1])]
-            self.motions[f] = np.concatenate([self.motions[f], *motions], axis=-1)
+        motions = [face.relative_motion(found[0][: self._n], found[1]) for face in self._faces]
+        self.motions = np.concatenate([self.motions, np.concatenate(motions)], axis=-1)
         self._C = self.values_at(self.motions).reshape(len(self.steps), -1)
-        ones = [np.ones(len(face.points)) for face in self._faces]
-        added = self.values_at([np.column_stack([np.minimum(face.law.friction, FAR) * unit,
-                                         face.law.elastic_slip * unit, face.scale, face.law.adhesive * unit])
-                        for face, unit in zip(self._faces, ones)], new)
-        friction, slip, scale, pulls = added.T
-        self.friction = np.append(self.friction, np.where(friction < FAR, friction, np.inf))
-        self.elastic_slip, self._scale = np.append(self.elastic_slip, slip), np.append(self._scale, scale)
-        self._pulls = np.append(self._pulls, pulls > 0)
-        known = self.values_at([face.stiffness_in_tangent for face in self._faces], new)
-        self._S = np.concatenate([self._S, known * touched])
+        friction, self.elastic_slip, pulls = self.values_at(self._properties)[:, :3].T
+        self.friction, self._pulls = np.where(friction < FAR, friction, np.inf), pulls > 0
+        S = np.zeros((len(self.point_ids), *self._S.shape[1:]))
+        S[:old] = self._S
+        if touched:
+            S[old:] = self.values_at(np.concatenate([face.stiffness_in_tangent for face in self._faces]))[old:]
+        self._S = S
         return True
 
-    def values_at(self, values: Sequence[np.ndarray],
-                  point_ids: Sequence[tuple[int, int, int]] | None = None) -> np.ndarray:
-        """Return values at contact points of all ranks, shape (m, ...).
+    @cached_property
+    def _properties(self) -> np.ndarray:
+        """Properties of the n owned points of all faces: those of the C function `frame`, shape (n, 7)."""
+        found = np.empty((self.starts[-1], 7))
+        for face, rows in zip(self._faces, self.of_faces(found)):
+            law = face.law
+            for k, values in enumerate((np.minimum(law.friction, FAR), law.elastic_slip, law.adhesive, face.scale,
+                                        law.theta, law.shift, law.k)):
+                rows[:, k] = values
+        return found
+
+    @cached_property
+    def sticks(self) -> np.ndarray:
+        """Mask of those of the n owned points of all faces that never slide, shape (n,)."""
+        return self._properties[:, 0] >= FAR
+
+    def of_faces(self, values: np.ndarray) -> list[np.ndarray]:
+        """Return the parts of values at the n owned points of all faces, shape (n, ...), that belong to each face."""
+        return [values[a:b] for a, b in itertools.pairwise(self.starts)]
+
+    def face_and_point(self, row: int) -> tuple[int, int]:
+        """Return the number of the face, and on it the local number, of an owned point of all faces."""
+        f = bisect.bisect_right(self.starts, row) - 1
+        return f, row - self.starts[f]
+
+    def row(self, closure: GapClosure) -> int:
+        """Return the number of the point of a gap closure among the n points of all faces of its rank."""
+        return self.starts[closure.face] + closure.point
+
+    def values_at(self, values: np.ndarray) -> np.ndarray:
+        """Return values at the m points of all ranks, shape (m, ...), the same on all ranks.
 
         Args:
-            values: for each face, values at its locally owned points.
-            point_ids: (rank, face, point) of each point; None: all m points with known compliance.
-
-        Returns:
-            Values in the order of the points, the same on all ranks.
+            values: values at the n owned points of all faces, shape (n, ...).
         """
-        located = self._owned if point_ids is None else self._of_faces(point_ids)
-        found = np.zeros((len(self.point_ids if point_ids is None else point_ids), *values[0].shape[1:]))
-        for f, k, i, *_ in located:
-            found[k] = values[f][i]
-        return combined(self._comm, found, MPI.SUM)
+        return self._of_all_ranks(values[self._rows])
 
-    def spread(self, values: np.ndarray, among: list[np.ndarray]) -> None:
-        """Write values at the m points into the arrays of the faces.
+    def _of_all_ranks(self, own: np.ndarray) -> np.ndarray:
+        """Return values at the m points of all ranks, shape (m, ...), from those at the owned ones."""
+        if self._comm.size == 1:
+            return own
+        found = np.zeros((len(self.point_ids), *own.shape[1:]))
+        found[self._mine] = own
+        return np.asarray(combined(self._comm, found, MPI.SUM))
 
-        Args:
-            values: values at the points, shape (m, ...).
-            among: for each face, values at its locally owned points, changed in place.
-        """
-        for f, k, i, _ in self._owned:
-            among[f][i] = values[k]
+    def spread(self, values: np.ndarray, among: np.ndarray) -> None:
+        """Write values at the m points, shape (m, ...), into `among`, values at the n owned points of all faces."""
+        among[self._rows] = values[self._mine]
 
-    def _of_faces(self, point_ids: Sequence[tuple[int, int, int]]) -> list[tuple[int, np.ndarray, np.ndarray]]:
-        """Return (face number, indices in the list, local point numbers) for faces with listed points of this rank."""
+    def _located(self, point_ids: Sequence[tuple[int, int, int]]) -> tuple[Any, np.ndarray]:
+        """Return the indices of owned points in the list `point_ids`, and their numbers among those of all faces."""
         ids = np.array(point_ids, dtype=int).reshape(-1, 3)
-        mine = [np.flatnonzero((ids[:, 0] == self._comm.rank) & (ids[:, 1] == f)) for f in range(len(self._faces))]
-        return [(f, k, ids[k, 2]) for f, k in enumerate(mine) if len(k)]
+        mine = slice(None) if self._comm.size == 1 else np.flatnonzero(ids[:, 0] == self._comm.rank)
+        return mine, np.array(self.starts)[ids[mine, 1]] + ids[mine, 2]
 
-    def motion_to_targets(self, positions: Sequence[np.ndarray], place: np.ndarray, near: ToolFrame) -> np.ndarray:
+    def motion_to_targets(self, positions: np.ndarray, place: np.ndarray, near: ToolFrame) -> np.ndarray:
         """Return the motion that takes the m points to target positions along, and to their contact depth normal to
         tools.
 
         Args:
-            positions: for each face, present positions of its locally owned points relative to the tool, shape (n, 2),
-                length.
+            positions: present positions of the owned points relative to their tools, shape (n, 2), length.
             place: target positions of the m points, whose tangential components count, shape (m, 2), length.
             near: geometry of the tools at the m points.
 
@@ -185,23 +207,53 @@ class Points:
         along = np.einsum("ni,ni->n", near.tangent, place - self.values_at(positions))
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
-    def tool_frame(self, positions: Sequence[np.ndarray], force: np.ndarray) -> ToolFrame:
+    def tool_frame(self, positions: np.ndarray, force: np.ndarray) -> ToolFrame:
         """Return the geometry of the tools at the m points.
 
         Args:
-            positions: for each face, positions of its locally owned points relative to the tool, shape (n, 2), length.
+            positions: positions of the owned points relative to their tools, shape (n, 2), length.
             force: present contact forces in F at the m points, shape (m, 2), which give the depth `ToolFrame.beyond`.
 
         Returns:
             Normals, tangents and curvatures, and the penetrations that are missing for the forces.
         """
-        found = np.zeros((len(self.point_ids), 4))
-        for f, k, i, law in self._owned:
-            normal, found[k, 2], found[k, 3] = frame(law, positions[f][i], force[k], self._scale[k])
-            found[k, :2] = normal
-        found = combined(self._comm, found, MPI.SUM)
-        normal = found[:, :2].copy()
-        return ToolFrame(normal, normal[:, ::-1] * (-1.0, 1.0), found[:, 2], found[:, 3])
+        k, own = len(self._rows), force[self._mine]
+        if self._profiles is None:
+            found = self._frame_by_arrays(positions, own)
+        else:
+            found, (table, ranges) = np.empty(6 * k), self._profiles
+            compiled().frame(k, address(positions), address_of_integers(self._rows), address(own),
+                             address(self._properties), address_of_integers(ranges), address(table), address(found))
+        normal, tangent = found[: 2 * k].reshape(k, 2), found[2 * k: 4 * k].reshape(k, 2)
+        return ToolFrame(*map(self._of_all_ranks, (normal, tangent, found[4 * k: 5 * k], found[5 * k:])))
+
+    @cached_property
+    def _profiles(self) -> tuple[np.ndarray, np.ndarray] | None:
+        """Pieces of the profiles of all tools, shape (pieces, 9), and for each of the n owned points the first piece of
+        its tool, their number and that of lines, shape (n, 3). None if a law does not use the profile of its tool."""
+        tools = [face.law.profile for face in self._faces]
+        if None in tools:
+            return None
+        tables = [tool.table for tool in tools]
+        firsts = [0, *np.cumsum([len(table) for table in tables[:-1]])]
+        ranges = [(first, len(table), tool.lines) for first, table, tool in zip(firsts, tables, tools)]
+        return np.concatenate(tables), np.repeat(np.array(ranges), np.diff(self.starts), axis=0)
+
+    def _frame_by_arrays(self, positions: np.ndarray, force: np.ndarray) -> np.ndarray:
+        """Return the result of the C function `frame` for owned points, shape (6 k,), for any tools.
+
+        positions: of the n owned points of all faces, shape (n, 2), length. force: at the k points, shape (k, 2).
+        """
+        found = np.zeros((6, len(self._rows)))
+        for face, first, end in zip(self._faces, self.starts, self.starts[1:]):
+            k = np.flatnonzero((first <= self._rows) & (self._rows < end))
+            i = self._rows[k]
+            law, x = face.law.part(i - first), positions[i]
+            near = law.nearest(x)
+            N = np.einsum("ni,ni->n", force[k], near.normal) / face.scale[i - first]
+            beyond = law.depth(N if law.adhesive else np.maximum(N, 0.0)) - near.distance
+            found[:, k] = *near.normal.T, *near.tangent.T, near.curvature, beyond
+        return np.concatenate([found[:2].T.ravel(), found[2:4].T.ravel(), *found[4:]])
 
     def parts(self, force: np.ndarray, near: ToolFrame) -> tuple[np.ndarray, np.ndarray]:
         """Return the components of vectors normal and tangential to the tools.
@@ -215,17 +267,16 @@ class Points:
         """
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
-    def motion_under(self, forces: np.ndarray, f: int) -> np.ndarray:
-        """Return the motion of all locally owned points of a face under contact forces at the m points.
+    def motion_under(self, forces: np.ndarray) -> np.ndarray:
+        """Return the motion of the n owned points of all faces under contact forces at the m points.
 
         Args:
             forces: contact forces of sign -1, shape (m, 2).
-            f: number of the face.
 
         Returns:
-            Motion relative to the tool, shape (n, 2), length.
+            Motion relative to the tools, shape (n, 2), length.
         """
-        return self.motions[f] @ forces.ravel()
+        return self.motions @ forces.ravel()
 
     def forces_at_end(self, u: np.ndarray, status: np.ndarray, near: ToolFrame, force: np.ndarray,
                       to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -300,25 +351,3 @@ class Points:
         return (len(self.friction), address(self.friction), address(self._pulls), address(self._S), address(self._C),
                 address(near.normal), address(near.curvature))
 
-
-def frame(law: Any, x: np.ndarray, force: np.ndarray, scale: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the geometry of the tool at n points that it touches.
-
-    Args:
-        law: contact law of these points.
-        x: positions of the points relative to the tool, shape (n, 2), length.
-        force: contact forces in F, shape (n, 2).
-        scale: forces in F over tractions, shape (n,), 1/stress.
-
-    Returns:
-        Normals, shape (n, 2), curvatures, shape (n,), 1/length, and `ToolFrame.beyond`, shape (n,), length.
-    """
-    if law.profile is None:
-        near = law.nearest(x)
-        N = np.einsum("ni,ni->n", force, near.normal) / scale
-        return near.normal, near.curvature, law.depth(N if law.adhesive else np.maximum(N, 0.0)) - near.distance
-    normal, curvature, beyond = np.empty(x.shape), np.empty(len(x)), np.empty(len(x))
-    k, shift = np.broadcast_to(law.k, len(x)), np.broadcast_to(law.shift, len(x))
-    compiled().frame(len(x), address(x), address(force), address(scale), address(k), law.theta, law.adhesive,
-                     address(shift), *law.profile.compiled_table, address(normal), address(curvature), address(beyond))
-    return normal, curvature, beyond

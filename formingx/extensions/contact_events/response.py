@@ -7,7 +7,7 @@ from petsc4py import PETSc
 
 from ...ranks import combined
 from ...solve.arc_length import Curve
-from ...solve.equations import Array, ContactFace, Equations
+from ...solve.equations import Array, Equations
 from ...solve.local_contact import unit_forces
 from ...solve.state import State
 
@@ -69,16 +69,12 @@ class Response:
         if not self.is_valid:
             return None
         self._x.array_w[:] = x
-        faces: list[ContactFace] = list(self._problem.present)
-        applied: list[Array] = []
-        for face, given in zip(faces, forces, strict=True):
-            face.keep_open(known := ~np.isnan(given[:, 0]))
-            applied.append(np.where(known[:, None], given, 0.0))
+        for face, given in zip(self._problem.present, forces, strict=True):
+            face.apply(given)
         self._problem.residual(self._x, control, self._F)
+        for face in self._problem.present:
+            face.apply(None)
         left = self._F.array_r.copy()
-        for face, given in zip(faces, applied):
-            face.add(left, given)
-        self._problem.begin()
         left[self._problem.constrained] = 0.0
         found = self._solve(left[:, None])
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))

@@ -121,14 +121,15 @@ class AdmissibilityCheck:
             return [Finding("serious", deep.name, f"{deep.words}: shorter steps (StepControl(length=...)), or a larger"
                                                   " penalty.") for deep in deepest]
         with self._problem.state_context(state):
-            edges, found = self._outline.edges(), []
+            edges, found = self._outline.edges(), list[Finding]()
+            lengths = _lengths(edges)
             for contact in self._problem.present:
                 error = _force_error(contact, state, self._images)
                 if error > _LIMITS.warning_error:
                     name = contact.contact.label
                     found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
                                          f" about {100 * error:.2g} %: {_penalty_advice(contact, error)}."))
-            for cut in self._deepest(edges, state, own=True):
+            for cut in self._deepest(edges, lengths, state, own=True):
                 found.append(Finding("warning", cut.name, f"Between contact points the face is {cut.depth:.3g} deep in"
                                      f" the tool of {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}):"
                                      f" smaller elements there, or a larger fillet."))
@@ -156,18 +157,19 @@ class AdmissibilityCheck:
                        " remesh on the way (trace(remesh=Remesh(size=...)), for a crushed block), or adapt the mesh"
                        f" by a pilot run (trace(adapt_mesh=True), for a sheet over an edge)")
             edges = self._outline.edges()
-            for deep in self._deepest(edges, state, own=False):
+            lengths = _lengths(edges)
+            for deep in self._deepest(edges, lengths, state, own=False):
                 yield (f"the body is {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
                        f" ({deep.place[0]:.5g}, {deep.place[1]:.5g}): a face without a Contact is there, or the"
                        f" elements are too large for the tool")
-            for deep in self._excess_penetration(edges, state):
+            for deep in self._excess_penetration(edges, lengths, state):
                 yield (f"the body did not follow the tool of {deep.name!r}: contact points are {deep.depth:.4g} deep in"
                        f" it, {100 * deep.ratio * _LIMITS.penetration:.2g} % of the remaining wall: give Contact a"
                        f" penalty of {50 * deep.ratio * deep.contact.contact.penalty:.1g}")
             for contact in problem.present:
                 error = _force_error(contact, state, self._images)
-                depth = resultants.penetration(contact, state.x, state.control)
-                if error > _LIMITS.largest_error and depth > _LIMITS.negligible_penetration * contact.thickness:
+                if error > _LIMITS.largest_error and resultants.penetration(
+                        contact, state.x, state.control) > _LIMITS.negligible_penetration * contact.thickness:
                     yield (f"the body did not follow the tool of {contact.contact.label!r}: penetration changes"
                            f" the force by about {100 * error:.2g} %: {_penalty_advice(contact, error)}")
                 if _pulled(contact, state):
@@ -177,21 +179,33 @@ class AdmissibilityCheck:
         if place is not None:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
 
-    def _deepest(self, edges: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
+    def _deepest(self, edges: np.ndarray, lengths: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
         """Yield for each active tool in a section the deepest point of the boundary, if it is deeper than allowed.
+
+        Edges are examined whose ends and middle are so deep that a point between them may be too deep: no point of an
+        edge is farther from the nearest of the three than a quarter of the largest derivative of its parabola.
 
         Args:
             edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
+            lengths: their lengths, shape (m,).
             state: the state.
             own: True to examine the face of the contact alone, with the limit of a warning; False: the whole boundary,
                 with `Limits.depth`.
         """
-        present = [pair for pair in zip(self._problem.contacts, self._faces) if pair[0].present]
-        points, length = (edge_points(edges), _lengths(edges)) if present else (edges, edges)
-        for contact, face in present:
+        a, b, middle = edges.transpose(1, 0, 2)
+        slopes = np.linalg.norm([4 * middle - 3 * a - b, a - 4 * middle + 3 * b], axis=-1)
+        for contact, face in zip(self._problem.contacts, self._faces):
+            if not contact.present:
+                continue
+            allowed = _LIMITS.depth * np.maximum(contact.thickness, lengths)
+            if own:
+                allowed = np.where(face, CUT * contact.thickness, np.inf)
+            near = np.flatnonzero(_depths(contact, edges, state).max(1) + slopes.max(0) / 4 > allowed)
+            if not len(near):
+                continue
+            points = edge_points(edges[near])
             depth = _depths(contact, points, state)
-            allowed = CUT * contact.thickness if own else _LIMITS.depth * np.maximum(contact.thickness, length)
-            share = np.where(face | (not own), depth.max(1) / allowed, 0.0)
+            share = depth.max(1) / allowed[near]
             k = int(np.argmax(share))
             if share[k] > 1:
                 yield Depth(share[k], depth[k].max(), points[k, np.argmax(depth[k])], contact, contact.contact.label)
@@ -215,11 +229,12 @@ class AdmissibilityCheck:
                 if rows[k, 0] > 1:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
 
-    def _excess_penetration(self, edges: np.ndarray, state: State) -> Iterator[Depth]:
+    def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield for each tool the contact point of largest penetration over the deformed wall, if above its limit.
 
         Args:
             edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
+            lengths: their lengths, shape (m,).
             state: the state.
         """
         weight, reference = self._problem.scene.kinematics.weight, self._outline.rest
@@ -227,7 +242,7 @@ class AdmissibilityCheck:
             if not contact.present or contact.contact.points != "nodes" or not face.any():
                 continue
             depth = _depths(contact, edges[face], state).max(1)
-            grown = _lengths(edges[face]) / self._reference_lengths[face]
+            grown = lengths[face] / self._reference_lengths[face]
             grown = grown * weight(edges[face, 2].T) / weight(reference[face, 2].T)
             share = depth * grown / (_LIMITS.penetration * contact.thickness)
             k = int(np.argmax(share))
