@@ -133,7 +133,7 @@ class FaceContact:
             step: change of the control, a number or shape (k,).
         """
         motion = self._length * self.displacement(dx)
-        return motion - np.multiply.outer(self._rate * self._travel_vector, step) if self._rate else motion
+        return motion - np.multiply.outer(self._travel_vector, self._rate * step) if self._rate else motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
         """Return the contact tractions at the points in a state; at the state last linearised, of the linearised law.

@@ -35,6 +35,7 @@ class Increment:
         self._guessed = guessed
         self._sense: np.ndarray | None = None               # of sliding in the last iteration
         self._last: tuple[np.ndarray, Tractions] | None = None
+        self._last_positions = b""                          # those of `_last`
 
     def tractions(self, x: np.ndarray) -> Tractions:
         """Return the tractions at given positions: of the law, or after `linearise(x)` of the linearised law.
@@ -47,8 +48,9 @@ class Increment:
         Returns:
             Tractions at the points, with their stiffness.
         """
-        if self._last is None or not np.array_equal(x, self._last[0]):
-            self._last = x, self._law.tractions(x, self._history)
+        positions = x.tobytes()
+        if self._last is None or positions != self._last_positions:
+            self._last, self._last_positions = (x, self._law.tractions(x, self._history)), positions
         return self._last[1]
 
     def linearise(self, x: np.ndarray) -> np.ndarray:

@@ -189,11 +189,17 @@ class MaterialHistory:
     def _array(self, name: str) -> np.ndarray:
         """Return the values of an internal variable at all quadrature points of this rank, shape (points, components).
         """
-        return self._terms.internal[name].x.array.reshape(-1, self._sizes[name])
+        return self._storage[name][0]
 
     def _rows(self, name: str, cells: np.ndarray) -> np.ndarray:
         """Return the rows of `_array` that belong to some cells, shape (cells, points)."""
-        return self._terms.internal[name].function_space.dofmap.list[cells]
+        return self._storage[name][1][cells]
+
+    @cached_property
+    def _storage(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
+        """{name: (`_array`, rows of it that belong to each cell, shape (cells, points))} of the internal variables."""
+        return {name: (np.asarray(f.x.array).reshape(-1, self._sizes[name]), np.asarray(f.function_space.dofmap.list))
+                for name, f in self._terms.internal.items()}
 
     def _set(self, name: str, cells: np.ndarray, values: np.ndarray) -> None:
         """Set an internal variable in some cells to values of shape (components,) or (cells, points, components)."""

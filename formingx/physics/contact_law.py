@@ -78,7 +78,7 @@ class Tractions:
         """`ContactHistory` of the n points in the state with these tractions, valid once the state is accepted."""
         return self._history()
 
-    @property
+    @cached_property
     def status(self) -> np.ndarray:
         """`ContactStatus` of each point, shape (n,): a point without normal traction is open."""
         return np.where(self.normal != 0, self.sense, ContactStatus.FREE).astype(np.int8)

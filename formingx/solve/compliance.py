@@ -78,7 +78,7 @@ class Columns:
         Args:
             moved: function that returns k motions for an update of unknowns and control (`Moved`).
         """
-        return moved(self._values, self.steps)
+        return np.asfortranarray(moved(self._values, self.steps))         # a column of each force in one piece
 
     def update(self, forces: Array) -> tuple[Array, float]:
         """Return the updates of unknowns and control for a linear combination of the right-hand sides.

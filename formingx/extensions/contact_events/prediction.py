@@ -160,6 +160,8 @@ class ContactEventPrediction:
 
     def _separates(self, length: float) -> bool:
         """Return True if a sticking point of the accepted state is in tension at an arc length; collective."""
+        if not self._sticking:
+            return False
         x = self._sequence.positions(length)
         tension = any(np.any(N + np.einsum("ni,ni->n", slope, x[f][closed] - start) < 0)
                       for f, closed, N, start, slope in self._sticking)
