@@ -54,6 +54,17 @@ def test_every_accuracy_keeps_its_promise(name, accuracy):
     assert error(name, moulds.MOULDS[name](moulds.body(name, accuracy=accuracy))) < moulds.PROMISED[accuracy]
 
 
+def test_a_uniform_mesh_is_safe_if_all_finer_ones_keep_the_promise():
+    """40 x 1 keeps 3 % by chance, because 60 x 1 does not; 20 x 2 is coarser and is no finer mesh than 40 x 1."""
+    def row(along, through, error):
+        return {"along": along, "through": through, "error": error, "million": along * through, "seconds": 1.0}
+    rows = {"draft": row(30, 1, 0.01), "uniform": [row(40, 1, 0.02), row(60, 1, 0.04), row(20, 2, 0.05),
+                                                   row(40, 2, 0.02), row(60, 2, 0.01)]}
+    draft = moulds.with_cheapest(rows)["draft"]
+    assert draft["million_ratio"] == 30 / 40 and draft["cheapest"].startswith("40 x 1")
+    assert draft["safe"] == "40 x 2" and draft["safe_ratio"] == 30 / 80
+
+
 def test_material_of_the_fillet_and_its_wall_are_estimated(standard_cup):
     """To 5 % of the sheet's length, and to a tenth of the wall."""
     disc = np.column_stack([np.linspace(0, 10, 500), np.full(500, 0.3)])
