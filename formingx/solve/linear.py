@@ -183,7 +183,7 @@ class DirectSolver:
     def _sparse(self, rhs: Array) -> PETSc.Mat | None:
         """Return right-hand sides, shape (n, m), as a sparse matrix; None if MUMPS gains nothing by their zeros."""
         (n, m), rows = rhs.shape, CONDENSATION.rows
-        if self._matrix.comm.size > 1 or rows * np.count_nonzero(rhs[:, 0]) > n:
+        if rows > n * m or self._matrix.comm.size > 1 or rows * np.count_nonzero(rhs[:, 0]) > n:
             return None
         column, row = np.nonzero(rhs.T)
         if not 0 < rows * len(row) <= n * m:

@@ -23,7 +23,7 @@ from ...contact.gap_closures import crossing, gap_closures
 from ...physics.contact_law import FAR, ContactStatus
 from ...ranks import combined, listed
 from .gap_closure import GapClosure
-from .reduced_contact import Points
+from .reduced_contact import Points, ToolFrame
 from .response import Response
 
 
@@ -138,6 +138,7 @@ class ContactEventSequence:
         blank = np.zeros((0, start[0].shape[1]))
         self._pieces = [_Segment(0.0, np.concatenate(start), self._along, np.zeros(0, dtype=int), blank, blank, blank,
                                  blank, blank, (np.zeros(len(x)), 0.0))]
+        self._near = self._points.tool_frame(self._pieces[0].positions, blank)     # at the start of the last segment
         self._end: _Segment | None = None                     # end of the last segment, in equilibrium
         self._taken = self._work = 0                        # closures with a contact force; see `EventSettings.work`
         self.ends, self.stops = np.inf, False
@@ -250,10 +251,13 @@ class ContactEventSequence:
         del self._pieces[0]
         return True
 
-    def _append(self, piece: _Segment, status: np.ndarray) -> bool:
-        """Append a segment from the start of `piece`, with new statuses, shape (m,); False if none are admissible."""
-        points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
-        self._work += 1
+    def _append(self, piece: _Segment, status: np.ndarray, near: ToolFrame | None = None) -> bool:
+        """Append a segment from the start of `piece`, with new statuses, shape (m,); False if none are admissible.
+
+        near: geometry of the tools there, if it is known.
+        """
+        points, near = self._points, near or self._points.tool_frame(piece.positions, piece.force)
+        self._near, self._work = near, self._work + 1
         found = points.rates(points.values_at(self._along), status, near, piece.force)
         if found is None:
             return False
@@ -277,10 +281,11 @@ class ContactEventSequence:
         self._taken += 1
         end, k = end.extended(len(self._points.point_ids)), self._points.point_ids.index(closure.point_id)
         status, place = end.status.copy(), end.place.copy()
-        slips = self._points.values_at(last.speed)[k] @ self._points.tool_frame(end.positions, end.force).tangent[k]
+        near = self._points.tool_frame(end.positions, end.force)
+        slips = self._points.values_at(last.speed)[k] @ near.tangent[k]
         status[k] = ContactStatus.STICKS if self._points.friction[k] == np.inf else -1 if slips < 0 else 1
         place[k] = closure.place
-        return self._append(end._replace(status=status, place=place), status)
+        return self._append(end._replace(status=status, place=place), status, near)
 
     def _find_next(self, length: float) -> bool:
         """Store the next gap closure within an arc length, after changes of status; return False if there is none."""
@@ -290,8 +295,7 @@ class ContactEventSequence:
                 return False
             times = self._gap_closures(last, length - last.begins)
             first = min(listed(self._comm, float(times.min(initial=np.inf))))
-            frame = self._points.tool_frame(last.positions, last.force)
-            after, status = self._points.change(last.status, frame, last.force, last.rate)
+            after, status = self._points.change(last.status, self._near, last.force, last.rate)
             if not after < min(first, length - last.begins):
                 break
             if not self._append(last.after(last.begins + after), status):
