@@ -5,6 +5,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from conftest import printed_by
 from mpi4py import MPI
 from test_contact import cup, form
 from without import run_without
@@ -174,6 +175,22 @@ def test_the_core_without_contact_events(tmp_path):
     path = form(cup("stick", (20, 1)), 30.0)
     assert file.startswith(str(tmp_path)) and int(steps) > 2 * path.counts.steps
     np.testing.assert_allclose(path.profile().thickness, [float(t) for t in walls], rtol=4e-3)
+
+
+ON_RANKS = """
+import sys
+sys.path.insert(0, "tests")
+from test_contact import cup, form
+path = form(cup("stick", (10, 1), points=3), 20.0)
+print(path.problem.limit.predicts_events, path.profile().thickness[0])
+"""
+
+
+def test_events_at_points_between_nodes_on_two_ranks():
+    """Points whose nodes are on another rank: all ranks evaluate the contact law together, also where none sticks."""
+    (active, one), = (printed.split() for printed in printed_by(ON_RANKS))
+    others = [printed.split() for printed in printed_by(ON_RANKS, ranks=2, timeout=200)]
+    assert active == "True" and [float(t) for _, t in others] == pytest.approx(2 * [float(one)], rel=1e-6)
 
 
 def test_anderson_mixing_converges_where_iterations_oscillate():

@@ -203,11 +203,8 @@ class FaceContact:
             fields: locally owned unknowns of the state.
             control: load parameter (control) of the state, dimensionless.
         """
-        force = self._applied
-        if force is None or np.isnan(force).any():
-            of_law = self._scale[:, None] * self.tractions(fields, control).force
-            force = of_law if force is None else np.where(np.isnan(force), of_law, force)
-        self.add(values, force)
+        force = self._scale[:, None] * self.tractions(fields, control).force
+        self.add(values, force if self._applied is None else np.where(np.isnan(self._applied), force, self._applied))
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Linearise the contact law for a Newton iteration at a state.

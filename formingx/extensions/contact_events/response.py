@@ -69,11 +69,13 @@ class Response:
         if not self.is_valid:
             return None
         self._x.array_w[:] = x
-        for face, given in zip(self._problem.present, forces, strict=True):
-            face.apply(given)
-        self._problem.residual(self._x, control, self._F)
-        for face in self._problem.present:
-            face.apply(None)
+        try:
+            for face, given in zip(self._problem.present, forces, strict=True):
+                face.apply(given)
+            self._problem.residual(self._x, control, self._F)
+        finally:
+            for face in self._problem.present:
+                face.apply(None)
         left = self._F.array_r.copy()
         left[self._problem.constrained] = 0.0
         found = self._solve(left[:, None])
