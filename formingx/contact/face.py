@@ -438,7 +438,7 @@ class FaceContact:
         if variables is None:
             return None
         interpolation, history = MovingLeastSquares(self.comm, mapping(source.points), self.points), variables.history
-        distance, newly_closed, penalty = (interpolation.all(values)[interpolation.nearest] for values in
+        distance, newly_closed, penalty = (interpolation.source_values(values)[interpolation.nearest] for values in
                                       (history.distance, variables.newly_closed, variables.penalty))
         touched, position, theta = distance > -source.law.theta, self.positions(x, control), self.law.theta
         free = np.minimum(self.law.distance(position), -(1 + 1e-9) * theta)

@@ -81,7 +81,7 @@ class Admissible:
             gradients = np.einsum("dpa,cpdx->cpxa", shapes[1:], np.linalg.inv(jacobian))
             self._gradients = gradients.reshape(n, -1, shapes.shape[2])            # (cells, points x 2, dofs)
 
-    def least(self) -> WorstValue:
+    def minimum(self) -> WorstValue:
         """Return the smallest of all hoop stretches and in-plane determinants for the current field; collective.
 
         Returns:
@@ -95,7 +95,7 @@ class Admissible:
         parts = [part for parts in listed(self._forms.comm, found) for part in parts]
         return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
 
-    def furthest_volume_ratio(self) -> WorstValue | None:
+    def extreme_volume_ratio(self) -> WorstValue | None:
         """Return the volume ratio J with the largest |ln J| for the current field; collective.
 
         Returns:
@@ -142,7 +142,7 @@ class Admissible:
         """Check that no point has crossed the axis and that no element is inverted; collective.
 
         In-plane determinants are checked at the quadrature points of the energy only. Between them a sharp edge may
-        invert a strongly bent element without harm to the solution, as in a coarse mesh under a plug. `least` finds
+        invert a strongly bent element without harm to the solution, as in a coarse mesh under a plug. `minimum` finds
         such points.
 
         Returns:

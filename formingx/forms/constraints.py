@@ -39,7 +39,7 @@ class Active(NamedTuple):
         owned: mask of the locally owned unknowns in `dofs`, shape (n,).
         driver: number in `Scene.items` of the support that moves each unknown; -1 for fixed unknowns, shape (n,).
         rows: for each constrained mean its row of the constraint matrix, locally owned entries; 0 if it is inactive.
-        present: for each constrained mean True if it is active.
+        means_active: for each constrained mean True if it is active.
     """
 
     bcs: list[Any]
@@ -47,7 +47,7 @@ class Active(NamedTuple):
     owned: np.ndarray
     driver: np.ndarray
     rows: list[np.ndarray]
-    present: list[bool]
+    means_active: list[bool]
 
 
 class Constraints:
@@ -116,11 +116,11 @@ class Constraints:
         order = np.argsort(drivers < 0, kind="stable")          # where two supports meet, the driven one counts
         dofs, first = np.unique(numbers[order], return_index=True)
         owned = dofs < self._n
-        present = [item not in inactive for item, _ in self.means]
-        rows = [active * row for (_, row), active in zip(self.means, present, strict=True)]
+        means_active = [item not in inactive for item, _ in self.means]
+        rows = [active * row for (_, row), active in zip(self.means, means_active, strict=True)]
         for row in rows:
             row[dofs[owned]] = 0
-        return Active([entry.bc for entry in entries], dofs, owned, drivers[order][first], rows, present)
+        return Active([entry.bc for entry in entries], dofs, owned, drivers[order][first], rows, means_active)
 
     def _dofs_of(self, support: Any, sub: Any, item: Constrained) -> np.ndarray:
         """Return the local numbers of the unknowns that a constraint prescribes, with ghosts, shape (n,).

@@ -21,7 +21,7 @@ class Body(NamedTuple):
 
     Attributes:
         points: reference quadrature points, shape (m, k, 2), length.
-        moved: deformed quadrature points, shape (m, k, 2), length.
+        deformed_points: deformed quadrature points, shape (m, k, 2), length.
         J: det F at the quadrature points, shape (m, k).
         I1: tr F^T F at the quadrature points, shape (m, k).
         section: in-plane part of F at the quadrature points, shape (m, k, 2, 2).
@@ -32,7 +32,7 @@ class Body(NamedTuple):
     """
 
     points: np.ndarray
-    moved: np.ndarray
+    deformed_points: np.ndarray
     J: np.ndarray
     I1: np.ndarray
     section: np.ndarray

@@ -15,15 +15,13 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
-from petsc4py import PETSc
-from ufl.algorithms.analysis import extract_constants
 
 from .. import _compat
 from ..errors import call_on_all_ranks
 from ..physics import kinematics as kin
 from ..ranks import combined
 from .admissible import Admissible
-from .body_model import BodyModel
+from .controlled_loads import ControlledLoads
 from .free_stretch import FreeStretch
 from .history import History
 from .loaded_body import LoadedBody
@@ -33,7 +31,7 @@ from .probes import Probe
 from .temperature import Temperature
 
 
-class Formulation(BodyModel):
+class Formulation(ControlledLoads):
     """Fields and variational forms (UFL) of a model declaration (`Scene`), without contact.
 
     Displacements are divided by `length`, pressures by `stress`, and the residual by stress times volume.
@@ -134,17 +132,6 @@ class Formulation(BodyModel):
         damaged = [self.weighted(self._scale * terms.damage_energy(), terms.names)
                    for terms in changing if terms not in timed]
         self.damage_energy = sum(damaged[1:], damaged[0]) if damaged else None
-
-    def _add_supports(self, body: LoadedBody) -> None:
-        """Add the energies of elastic supports."""
-        self.elastic_supports: list[tuple[Any, fem.Constant]] = []
-        for support in self.scene.supports:
-            energy = body.stored(support)
-            if energy is not None:
-                active = self.constant(1.0)
-                self.elastic_supports.append((support, active))
-                self.potential, self.energy = (None if e is None else e + self._scale * active * energy
-                                               for e in (self.potential, self.energy))
 
     def refresh(self) -> None:
         """Update the integrals over past states (K-BKZ materials) after a change of fields or time."""
@@ -250,17 +237,6 @@ class Formulation(BodyModel):
         If the tangent is singular in the reference configuration, the path takes its first direction from these fields.
         """
         self.w.x.array[:] = 0
-
-    def constant(self, value: float) -> fem.Constant:
-        """Return a number in a form that can be changed without recompiling the form.
-
-        Args:
-            value: initial value.
-
-        Returns:
-            The `Constant`.
-        """
-        return fem.Constant(self.domain, PETSc.ScalarType(value))
 
     def compile(self, form: Any) -> Any:
         """Compile a form.
@@ -382,69 +358,3 @@ class Formulation(BodyModel):
             The form (UFL, rank 0).
         """
         return self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1]
-
-    @property
-    def clock(self) -> float:
-        """Process time at control 0, which a run that chooses its own time steps sets before each step."""
-        return float(self._time[0].value)
-
-    @clock.setter
-    def clock(self, time: float) -> None:
-        self._time[0].value = time
-
-    def time_at(self, control: float) -> float:
-        """Return the process time at a value of the control, for the present step data (`StepData`).
-
-        Args:
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            Process time.
-        """
-        base, rate = self._time
-        return float(base.value + rate.value * control)
-
-    @property
-    def time_now(self) -> float:
-        """Process time at the present control of the forms."""
-        return self.time_at(float(self.control.value))
-
-    def set_loads(self, setting: Any) -> None:
-        """Set loads, elastic supports and process time as functions of the control.
-
-        Args:
-            setting: amplitudes of the loads and of the time, and inactive items of the scene (`StepData`).
-        """
-        for support, present in self.elastic_supports:
-            present.value = float(not any(self.scene.items[i] is support for i in setting.inactive))
-        for i, (load, base, rate) in enumerate(self._loads):
-            active = i not in setting.inactive
-            base.value = active * (setting.base[i] if load.driven else load.value)
-            rate.value = active * setting.rate[i]
-        for constant, value in zip(self._time, (setting.base[-1], setting.rate[-1])):
-            constant.value = value
-
-    def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
-        """Return `residual`, `control_derivative` and `time_derivative`."""
-        v, control = self.test_function(), self._control
-        residual = ufl.derivative(self.potential, self.w, v)
-        for entry in self.terms:
-            if work := entry.unsymmetric_work(self.elastic_F, lambda f: ufl.derivative(f, self.w, v)):
-                residual += self.weighted(self._scale * work, entry.names)
-        timed = ufl.Form([i for i in self.potential.integrals() if self.control in extract_constants(i.integrand())])
-        by_time = ufl.derivative(ufl.diff(timed, control), self.w, v) if timed.integrals() else None
-        terms = []
-        self._loads = []
-        self.load_works = []
-        self.load_values = []
-        for load, scale in zip(self.scene.loads, self.scales):
-            base, rate = self.constant(0.0 if load.driven else load.value), self.constant(0.0)
-            self._loads.append((load, base, rate))
-            value = self.constant(scale) * (base + rate * control) if load.driven else base
-            self.load_values.append((load, value))
-            work = body.work(load, value)
-            self.load_works.append(work)
-            residual -= self._scale * work
-            if load.driven:
-                terms.append(-self._scale * ufl.diff(work, control))
-        return residual, sum(terms[1:], terms[0]) if terms else None, by_time

@@ -69,7 +69,7 @@ class Histories:
 
     @property
     def clock(self) -> float:
-        """Process time at control 0, which a run that chooses its own time steps sets before each step."""
+        """Process time at control 0; a run that chooses its own time steps sets it before each step."""
         return self.forms.clock
 
     @clock.setter

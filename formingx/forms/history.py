@@ -94,7 +94,8 @@ class History(Protocol):
             source: history of the same material, contact or temperature in the other problem. That problem must be set
                 to the state to transfer.
             variables: history variables of `source` in this state.
-            x: unknowns of the state in this problem, to which its forms are set, locally owned entries, shape (n,).
+            x: unknowns of the state on this mesh, locally owned entries, shape (n,). The forms of this problem must be
+                set to them.
             control: load parameter (control) of the state, dimensionless.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
 

@@ -86,7 +86,7 @@ class LoadedBody:
         return Face(normal, measure, self.kinematics.weight(self.X))
 
     def constant(self, value: float) -> fem.Constant:
-        """Return a number in a form that can be changed without recompiling the form.
+        """Return a UFL constant; a new value needs no new compilation of the forms that contain it.
 
         Args:
             value: initial value.

@@ -117,8 +117,8 @@ class MaterialHistory:
             variables: values from `get`.
 
         Returns:
-            {"time": process time, "cells": cell numbers of the script's mesh, "values": {name: values in these cells,
-            shape (cells, points, components)}}.
+            {"time": process time, "cells": cell numbers in the order in which the script gave the cells, ascending,
+            "values": {name: values in these cells, shape (cells, points, components)}}.
         """
         comm = self._forms.comm
         numbers = gathered(comm, self._numbers)
@@ -192,12 +192,18 @@ class MaterialHistory:
         return self._storage[name][0]
 
     def _rows(self, name: str, cells: np.ndarray) -> np.ndarray:
-        """Return the rows of `_array` that belong to some cells, shape (cells, points)."""
+        """Return the numbers of the quadrature points of some cells, shape (cells, points of a cell).
+
+        name: an internal variable; the numbers are the row numbers of its values `_array`.
+        """
         return self._storage[name][1][cells]
 
     @cached_property
     def _storage(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """{name: (`_array`, rows of it that belong to each cell, shape (cells, points))} of the internal variables."""
+        """{name: (values, row numbers of each cell)} of the internal variables.
+
+        The values have the shape (quadrature points, components), the row numbers (cells, points of a cell).
+        """
         return {name: (np.asarray(f.x.array).reshape(-1, self._sizes[name]), np.asarray(f.function_space.dofmap.list))
                 for name, f in self._terms.internal.items()}
 

@@ -136,13 +136,13 @@ class MidSurface(Formulation):
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
     def temperatures(self, terms: Any) -> np.ndarray:
-        """Return the constant temperature halfway between the faces of the layer.
+        """Return the temperatures halfway between the faces of a layer; in a membrane they do not change with time.
 
         Args:
-            terms: the `MaterialTerms`.
+            terms: the material of the layer in the forms (`MaterialTerms`).
 
         Returns:
-            Temperatures at the quadrature points, shape (1, cells, q).
+            Temperatures at the q quadrature points of each cell, shape (1, cells, q).
         """
         nodes = cell_node_positions(self.domain, terms.cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)

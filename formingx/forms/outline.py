@@ -30,7 +30,7 @@ class Outline:
         forms: the `Solid`; its `w` is the examined field.
 
     Attributes:
-        rest: start, end and midpoint of each edge in the reference configuration, shape (m, 3, 2), length.
+        reference_edges: start, end and midpoint of each edge in the reference configuration, shape (m, 3, 2), length.
         ends: vertex numbers of start and end of each edge, shape (m, 2); edges that meet share a number.
     """
 
@@ -54,7 +54,7 @@ class Outline:
         names = vectors.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(-1, 3)
         ends = self._gathered(names)[:, :2]
         self.ends = np.unique(ends, return_inverse=True)[1].reshape(-1, 2)
-        self.rest = self._gathered(self._own)
+        self.reference_edges = self._gathered(self._own)
 
     def edges(self) -> np.ndarray:
         """Return the deformed edges; collective.

@@ -44,7 +44,10 @@ class Probe:
         self._weights = _basis(forms.displacement_element, 0, self._reference)
 
     def _dofs_of(self, cells: np.ndarray) -> np.ndarray:
-        """Return the local numbers of the unknowns of cells, component by component, shape (m, components, dim)."""
+        """Return the local numbers of the displacement unknowns of m cells, shape (m, components, dim).
+
+        dim is the number of shape functions of a displacement component in a cell.
+        """
         return np.array([[sub.cell_dofs(c) for sub in self._subs] for c in cells], dtype=np.int64).reshape(
             len(cells), self._components, self._problem.forms.displacement_element.dim)
 
@@ -94,28 +97,33 @@ class Probe:
         stretch between them gives the in-plane stretch.
 
         Returns:
-            Row, locally owned entries, shape (n,); power, -1/2 if axisymmetric, -1 in plane strain.
+            Row, locally owned entries, shape (n,); exponent `power`: -1/2 if axisymmetric, -1 in plane strain.
         """
         (_, low), (_, high) = self.points
         row = self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low)
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """Return a vector whose product with the unknowns x is a weighted sum of the displacements of the points.
+        r"""Return a vector whose product with the unknowns x is a weighted sum of the displacements of the points.
+
+        .. math::
+            \text{row} \cdot x = \frac{1}{L} \sum_{i,c} w_{ic} u_{ic}
+
+        u_ic is the displacement component c of point i; L is the length scale of the unknowns (`forms.length`).
 
         Args:
-            factors: weights, shape (n, components).
+            factors: weights w_ic, shape (n, components).
 
         Returns:
-            Row with row . x = sum of weights times displacements over `forms.length`, locally owned entries, shape
-            (m,).
+            Row, locally owned entries.
         """
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
         """Return the dimensionless displacement of this rank's points, shape (m, 2).
 
-        values: unknowns of the cells of the points, shape (m, 2, dim).
+        values: displacement unknowns of the cells of the m points, shape (m, 2, dim); dim is the number of shape
+        functions of a component in a cell.
         """
         return np.einsum("kj,kij->ki", self._weights, values)
 
@@ -170,7 +178,11 @@ class MidSurfaceProbe(Probe):
         self._average_slopes(element, geometry)
 
     def _average_slopes(self, element: Any, geometry: Any) -> None:
-        """Store the mean of the tangents and of the displacement slopes d/dS at points where two elements meet."""
+        """Prepare means over both elements at points where two elements meet, of the tangent and of du/dS.
+
+        u is the displacement and S the reference arc length of the mid-surface. element: scalar element of a
+        displacement component. geometry: scalar element of the mid-surface.
+        """
         forms, domain = self._problem.forms, self._problem.forms.domain
         nodes = cell_node_positions(domain, own_cells(domain))
         R = forms.nearest(self.points)[:, 0]
@@ -186,7 +198,11 @@ class MidSurfaceProbe(Probe):
         self._tangent = np.where(self._meet[:, None], both / self._mean_length, self._tangent)
 
     def _at_ends(self, values: np.ndarray) -> np.ndarray:
-        """Return the means of values on both sides of the points where elements meet, shape (n, 2), all ranks."""
+        """Return the mean of a vector over both elements at points where two elements meet; collective.
+
+        values: vectors at the ends of this rank's elements that meet such a point, shape (ends, 2). The result has the
+        shape (n, 2) for all n points of the probe; it is 0 at points where no elements meet.
+        """
         total = np.zeros((len(self.points), self._components))
         np.add.at(total, self._ends[0], values / 2)
         return self._problem.comm.allreduce(total, MPI.SUM)
@@ -200,7 +216,7 @@ class MidSurfaceProbe(Probe):
             1 + \frac{\partial u_r}{\partial R} = 1 + \text{row} \cdot x
 
         Returns:
-            Row, locally owned entries, shape (n,); power, 1.
+            Row, locally owned entries, shape (n,); exponent of (1 + row . x), which is 1 for a membrane.
         """
         row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
         return row, 1.0
@@ -208,11 +224,13 @@ class MidSurfaceProbe(Probe):
     def row(self, factors: np.ndarray) -> np.ndarray:
         """Return a vector whose product with the unknowns x is a weighted sum of displacements on the mid-surface.
 
+        The sum is divided by the length scale of the unknowns (`forms.length`), as in `Probe.row`.
+
         Args:
-            factors: weights, shape (n, components).
+            factors: weights of the displacement components, shape (n, components).
 
         Returns:
-            Row with row . x = sum of weights times displacements over length, locally owned entries.
+            Row, locally owned entries.
 
         Raises:
             InputError: a point is not on the mid-surface.
@@ -246,12 +264,16 @@ class MidSurfaceProbe(Probe):
 
 
 def _normal(tangents: np.ndarray) -> np.ndarray:
-    """Return vectors rotated by a right angle, upwards, shape (m, 2)."""
+    """Return vectors rotated counterclockwise by 90 degrees, shape (m, 2)."""
     return np.column_stack([-tangents[:, 1], tangents[:, 0]])
 
 
 def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
-    """Return the basis of an element, or its derivative on an interval, at m points of its cell, shape (m, dim)."""
+    """Return the dim shape functions of an element at m points of its reference cell, shape (m, dim).
+
+    derivative: 0 for the values; 1 for the derivatives with respect to the coordinate of a reference interval.
+    reference: coordinates of the points in the reference cell, shape (m, dimension of the cell).
+    """
     if not len(reference):                             # basix does not take an empty set
         return np.zeros((0, element.dim))
     return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)

@@ -18,14 +18,15 @@ class StepData:
     process time.
 
     Attributes:
-        base: amplitude of each item at control 0 (0 for an item without control), then the process time.
+        base: amplitude of each load, support and contact at control 0, in the order of `Scene.items` (0 for those
+            without control), then the process time.
         rate: derivatives of the amplitudes and of the process time with respect to the control.
-        inactive: numbers of the inactive items.
-        fading: True if unbalanced forces, caused by a change of the active items, vanish as the control goes from 0
-            to 1.
+        inactive: indices of the inactive loads, supports and contacts in `Scene.items`.
+        fading: True if forces that a change of the active loads, supports or contacts leaves out of balance vanish as
+            the control goes from 0 to 1.
         stage: number of the stage in its process.
         piece: number of the piece of the stage; each piece has one control.
-        changed: numbers of the items that are deactivated or activated while the forces fade.
+        changed: indices of the items that are deactivated or activated while the forces fade.
         mesh: number of remeshings before (`formingx.extensions.remeshing.remeshing`).
     """
 
@@ -40,9 +41,9 @@ class StepData:
 
     @classmethod
     def first(cls, scene: Any) -> StepData:
-        """Return the step data of the unloaded scene with all its items.
+        """Return the step data of the unloaded scene, in which all loads, supports and contacts are active.
 
-        If the scene has one controlled item, its amplitude is the control. All other amplitudes are 0.
+        If the scene has one with a control, its amplitude equals the control. All other amplitudes are 0.
 
         Args:
             scene: the `Scene`.
@@ -69,10 +70,10 @@ class StepData:
         return not any(self.rate[:-1])
 
     def amplitude(self, number: int, control: float) -> float:
-        """Return the amplitude of an item.
+        """Return the amplitude of a load, support or contact, or the process time.
 
         Args:
-            number: number of the item; -1 for the process time.
+            number: index of the load, support or contact in `Scene.items`; -1 for the process time.
             control: load parameter (control), dimensionless.
 
         Returns:
@@ -84,7 +85,7 @@ class StepData:
         """Return the amplitude of a load that acts on the body.
 
         Args:
-            number: number of the load.
+            number: index of the load in `Scene.items`.
             control: load parameter (control), dimensionless.
 
         Returns:
@@ -97,13 +98,13 @@ class StepData:
         return share * self.amplitude(number, control)
 
     def amplitudes(self, control: float) -> list[float]:
-        """Return the amplitudes of the items and the process time.
+        """Return the amplitudes of all loads, supports and contacts, and the process time.
 
         Args:
             control: load parameter (control), dimensionless.
 
         Returns:
-            Amplitudes, then the process time.
+            Amplitudes in the order of `Scene.items`, then the process time.
         """
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
@@ -111,8 +112,9 @@ class StepData:
         """Return step data and control that give the same values in the user's units on the next mesh of a run.
 
         Args:
-            before: `Formulation.scales` of the present mesh: values over amplitudes, then 1 for the time.
-            now: `Formulation.scales` of the next mesh.
+            before: unit of each load, support and contact on the present mesh: its value in the user's units at
+                amplitude 1, in the order of `Scene.items`. The last entry, 1, belongs to the process time.
+            now: the same units on the next mesh.
             control: control on the present mesh, dimensionless.
 
         Returns:

@@ -102,15 +102,15 @@ class Solid(Formulation):
         return found
 
     def set_stiff(self) -> None:
-        """Set the unknowns `w` to a first guess: 0, or in a very thin sheet a small uniform stretch u = s X.
+        """Set the fields `w` to 0, or in a very thin sheet to a small uniform strain, u = 1e-4 X.
 
-        The bending stiffness of such a sheet is below round-off; the stress of the stretch stiffens it as a membrane.
-        The stretch is interpolated because the unknowns of bubbles are no nodal values.
+        u is the displacement and X the reference position. The bending stiffness of such a sheet is below round-off;
+        the stress of the strain stiffens it as a membrane.
         """
         super().set_stiff()
         if self.volume < _THIN_VOLUME * self.length**self.scene.kinematics.dimension_of_volume:
             space, dofs = self.space.sub(0).collapse()
-            u = fem.Function(space)
+            u = fem.Function(space)                    # interpolated, since unknowns of bubbles are no nodal values
             stretched = self.constant(_FIRST_STRETCH / self.length) * self.X
             u.interpolate(_compat.compile_expression(stretched, _compat.interpolation_points(space)))
             self.w.x.array[dofs] = u.x.array

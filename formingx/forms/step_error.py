@@ -61,13 +61,14 @@ class StepError:
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            Relative error of the stress at the end of the step; relative error that is left after relaxation for
-            another step length. The second error adds up from step to step. Both are 0 in a step without time.
+            Relative error of the stress at the end of the step; the part of it that is left after relaxation at
+            constant deformation for a time of the same length as the step. This second error adds up from step to
+            step. Both are 0 in a step without time.
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
         step = end - old.time if self._stresses else 0.0
-        first, found = (self._at(old.x, old.time), self._at(x, end)) if step > 0 else ([], [])
+        first, found = (self._stresses_at(old.x, old.time), self._stresses_at(x, end)) if step > 0 else ([], [])
         forms.clock = clock
         after = self._problem.predict(old, x, control)
         for history, variables in zip(forms.histories, start):
@@ -78,51 +79,61 @@ class StepError:
         errors = []
         if self._materials:
             self._advance(share @ np.array([*(state.x for state in past), x]), control, end - step / 2)
-        errors.append((self._at(x, end), found))
+        errors.append((self._stresses_at(x, end), found))
         if self._materials:
             self._advance(x, control, end)
-            better = self._relaxing(x, end + step)
+            better = self._stresses_after_relaxation(x, end + step)
             for history, variables in zip(forms.histories, after):
                 history.put(variables)
-            errors.append((better, self._relaxing(x, end + step)))
+            errors.append((better, self._stresses_after_relaxation(x, end + step)))
         for history, variables in zip(forms.histories, start):
             history.put(variables)
-        self._at_time(end)
+        self._set_time(end)
         forms.clock = clock
         relaxed = [stress.values() for stress in self._relaxed]     # branches may turn the sum through 0
         scale = max(self._norm(first), self._norm(found), self._norm(relaxed), _STRESS_FREE * forms.stress)
         once, lasting = [*(self._norm([a - b for a, b in zip(*pair)]) / scale for pair in errors), 0.0][:2]
         return self._weight * once, self._weight * lasting
 
-    def _at_time(self, time: float) -> None:
+    def _set_time(self, time: float) -> None:
         """Set the clock so that the process time equals `time`."""
         self._forms.clock += time - self._problem.time
 
-    def _at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return the stresses of the materials after a step from the present history variables to x at a time.
+    def _stresses_at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
+        """Return the stresses of each material at the end of a step from the current history variables.
 
-        x: unknowns, locally owned entries, shape (n,). The stresses have the shape (points, 4) for each material.
+        x: unknowns at the end of the step, locally owned entries, shape (n,). time: process time at its end. Each
+        array has the entries 11, 22, sqrt(2) 12, 33 of the deviatoric Kirchhoff stress, shape (points, 4).
         """
-        self._at_time(time)
+        self._set_time(time)
         self._problem.set_fields(x)
         return [stress.values() for stress in self._stresses]
 
-    def _relaxing(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return the stresses of the materials (`_at`) if the body relaxes at the constant deformation x until a time.
+    def _stresses_after_relaxation(self, x: np.ndarray, time: float) -> list[np.ndarray]:
+        """Return the stresses of each material after relaxation at constant deformation until a time.
+
+        x: unknowns, locally owned entries, shape (n,). Each array has the entries 11, 22, sqrt(2) 12, 33 of the
+        deviatoric Kirchhoff stress, shape (points, 4).
         """
         for history in self._materials:
             history.forget_motion()
-        return self._at(x, time)
+        return self._stresses_at(x, time)
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:
-        """Update the history variables of the materials to the unknowns x at a time."""
+        """Update the history variables of the materials to the unknowns x at a process time.
+
+        x: locally owned entries, shape (n,). control: load parameter (control) at this time, dimensionless.
+        """
         self._problem.set_fields(x)
-        self._at_time(time)
+        self._set_time(time)
         for history in self._materials:
             history.advance(x, control)
 
     def _norm(self, values: list[np.ndarray]) -> float:
-        """Return the root mean square of stresses over all points of all ranks; values: shape (points, 4) each."""
+        """Return the root mean square of stresses over all quadrature points of all ranks.
+
+        values: stresses of each material, shape (points, 4).
+        """
         comm = self._problem.comm
         total, number = (combined(comm, v, MPI.SUM)
                          for v in (float(sum(np.sum(v**2) for v in values)), sum(v.shape[0] for v in values)))

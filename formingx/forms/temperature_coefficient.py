@@ -24,8 +24,9 @@ class TemperatureCoefficient:
     Args:
         forms: the `Formulation`.
         values: `Function` of a quadrature element, set to f(T).
-        parts: list of (local numbers of cells, function f), a pair for each group of cells.
-        temperatures: temperatures at the q points of the cells of each group, shape (1 or 2, cells, q); see `update`.
+        parts: groups of cells with a function f each, list of (local numbers of cells, f).
+        temperatures: for each group the temperatures at the q quadrature points of its cells, shape (1 or 2, cells,
+            q). The first index is the time: the last accepted state, then, if it is known, the state before.
     """
 
     def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable]],
@@ -38,13 +39,13 @@ class TemperatureCoefficient:
         self.update(temperatures)
 
     def at_time(self, time: Any) -> Any:
-        """Return the coefficient at a time of the step.
+        """Return the coefficient, extrapolated to a time of the step.
 
         Args:
             time: process time (UFL scalar).
 
         Returns:
-            f (UFL scalar).
+            Coefficient f(t) of the class (UFL scalar).
         """
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 
@@ -52,10 +53,11 @@ class TemperatureCoefficient:
         """Update the coefficient to changed temperatures.
 
         Args:
-            temperatures: `Temperature.now_and_before` for the cells of each group, shape (1 or 2, cells, q) each.
+            temperatures: for each group of cells (`parts`) the temperatures at its quadrature points, shape (1 or 2,
+                cells, q): at the last accepted state and, if it is known, at the state before.
 
         Raises:
-            InputError: f has no value at a temperature.
+            InputError: the function f of a group has no value at a temperature.
         """
         given = list(temperatures)
         key = self._temperature.time, self._temperature.time_before, *(T.tobytes() for T in given)
@@ -73,11 +75,15 @@ class TemperatureCoefficient:
 
     @property
     def _functions(self) -> list[fem.Function]:
-        """DOLFINx functions of the coefficient f and, if temperatures change, of its logarithmic rate a."""
+        """DOLFINx functions of the coefficient f and, if temperatures change, of its logarithmic time rate a."""
         return [self._values] if self._rate is None else [self._values, self._rate]
 
     def _evaluate(self, temperatures: Sequence[np.ndarray]) -> None:
-        """Set the coefficient f and its logarithmic rate a from temperatures; see `update` for their shapes."""
+        """Set the coefficient f and its logarithmic rate a, in time, from temperatures.
+
+        temperatures: for each group of cells, shape (1 or 2, cells, q): at the last accepted state, then at the state
+        before. With one of them the rate is 0.
+        """
         temperature = self._temperature
         for (cells, function), T in zip(self._parts, temperatures, strict=True):
             rows = self._values.function_space.dofmap.list[cells]

@@ -36,7 +36,8 @@ class MovingLeastSquares:
         target: locally owned target points, shape (n, components), length.
 
     Attributes:
-        nearest: number of the source point nearest to each target point, in the order of `all`, shape (n,).
+        nearest: index of the source point nearest to each target point, shape (n,), for values at the source points of
+            all ranks (`source_values`).
     """
 
     def __init__(self, comm: Any, source: np.ndarray, target: np.ndarray):
@@ -62,16 +63,16 @@ class MovingLeastSquares:
         Returns:
             Values at the locally owned target points, shape (n, ...).
         """
-        return np.einsum("nk,nk...->n...", self._share, self.all(values)[self._rows])
+        return np.einsum("nk,nk...->n...", self._share, self.source_values(values)[self._rows])
 
-    def all(self, values: np.ndarray) -> np.ndarray:
+    def source_values(self, values: np.ndarray) -> np.ndarray:
         """Return the values at the source points of all ranks; collective.
 
         Args:
             values: values at the locally owned source points, shape (m, ...).
 
         Returns:
-            Values in the order that `nearest` refers to, shape (all source points, ...).
+            Values rank after rank, which `nearest` indexes, shape (all source points, ...).
         """
         return gathered(self._comm, values)
 
@@ -132,7 +133,11 @@ def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
 
 
 def _shapes(barycentric: np.ndarray) -> np.ndarray:
-    """Return the shape functions of `_PLACES`, shape (..., 7), at barycentric coordinates, shape (..., 3)."""
+    """Return the seven shape functions of a quadratic triangle with a bubble, shape (..., 7).
+
+    Each is 1 at its node and 0 at the others: the corners, the midpoints of the opposite edges, the centroid.
+    barycentric: barycentric coordinates, shape (..., 3).
+    """
     a, b, c = np.moveaxis(barycentric, -1, 0)
     bubble = 27 * a * b * c
     corners = [s * (2 * s - 1) + bubble / 9 for s in (a, b, c)]
@@ -155,7 +160,7 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
         source: problem on the other mesh.
         state: state of `source`.
         problem: problem whose history variables are set.
-        x: unknowns of the same state on the mesh of `problem`, locally owned entries.
+        x: unknowns of the same state on the mesh of `problem`, locally owned entries, shape (n,).
         control: load parameter (control) of the state, dimensionless.
         moved: True if the mesh of `problem` is a mesh of the deformed body in `state`.
     """

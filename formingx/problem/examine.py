@@ -35,17 +35,17 @@ class Examination:
     def __init__(self, problem: Any, last: Any, attempt: Any):
         self.facts: dict[str, Any] = {}
         self._problem, self._last = problem, last
-        self._shape: Body | None = None
+        self._elements: Body | None = None
         self._marks: list[tuple[str, np.ndarray]] = []
         x = problem.x.duplicate()
         if last is not None:
             x.array_w[:] = last.x
-            self._shape = body(problem, x, last.control)
+            self._elements = body(problem, x, last.control)
             self.facts["touching"] = problem.comm.allreduce(
                 sum(int(np.sum(touch)) for touch in _touching(problem, last.x, last.control)), MPI.SUM)
-            if self._shape:
-                self._find_worst(self._shape)
-                self._find_compressed(self._shape)
+            if self._elements:
+                self._find_worst(self._elements)
+                self._find_compressed(self._elements)
         if attempt is not None:
             self._examine_attempt(x, attempt)
         x.destroy()
@@ -54,22 +54,29 @@ class Examination:
             tooling = Tooling.of_problem(problem)
             self._tools = tooling.placed(tooling.travels(last.setting, last.control))
 
-    def _find_worst(self, shape: Body) -> None:
-        """Store the smallest J, the worst element shape and the point whose I1 is nearest to its limit, in `facts`."""
+    def _find_worst(self, elements: Body) -> None:
+        """Store the smallest J, the worst shape of an element, and the largest use of a material's stretch limit.
+
+        The use is (I1 - 3) / (limit of I1 - 3), with tr F^T F as I1. elements: the elements in the last good state.
+        The values are stored in `facts` under the names of the fields of a `Diagnosis`.
+        """
         problem, facts = self._problem, self.facts
-        facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, shape)
-        facts["shape"] = float((shape.quality / shape.initial_quality).min())
-        self._marks.append((f"smallest J {facts['smallest_J']:.3g}", shape.moved[at]))
-        limits = np.array([problem.scene.materials[_layer(problem, tag)].largest_I1 for tag in shape.layers])
-        near = (shape.I1 - 3) / (limits[:, None] - 3)
+        facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, elements)
+        facts["shape"] = float((elements.quality / elements.initial_quality).min())
+        self._marks.append((f"smallest J {facts['smallest_J']:.3g}", elements.deformed_points[at]))
+        limits = np.array([problem.scene.materials[_layer(problem, tag)].largest_I1 for tag in elements.layers])
+        near = (elements.I1 - 3) / (limits[:, None] - 3)
         if np.isfinite(limits).any():
             at = np.unravel_index(int(np.argmax(near)), near.shape)
             facts["I1"] = float(near[at])
-            facts["limit"] = place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]]))
-            self._marks.append(("nearest to the material's limit", shape.moved[at]))
+            facts["limit"] = place(problem.scene.mesh, elements.points[at], _layer(problem, elements.layers[at[0]]))
+            self._marks.append(("nearest to the material's limit", elements.deformed_points[at]))
 
-    def _find_compressed(self, shape: Body) -> None:
-        """Store the mean stretch and the ends of the longest piece of a sheet that is compressed along its section."""
+    def _find_compressed(self, elements: Body) -> None:
+        """Store the mean stretch and both ends of the longest part of a sheet that is compressed along its section.
+
+        elements: the elements in the last good state. The values are stored in `facts["shortened"]`.
+        """
         columns = self._problem.scene.mesh.columns
         if columns is None:
             return
@@ -77,9 +84,10 @@ class Examination:
         middles, tangents = (line[1:] + line[:-1]) / 2, np.diff(line, axis=0)
         lengths = np.linalg.norm(tangents, axis=1)
         tangents /= lengths[:, None]
-        near = np.array([np.argmin(np.hypot(*(middles - centre).T)) for centre in shape.points.mean(1)])
-        stretch = np.linalg.norm(np.einsum("mkij,mj->mki", shape.section, tangents[near]), axis=-1).mean(1)
-        found = np.bincount(near, stretch, len(middles)) / np.maximum(np.bincount(near, minlength=len(middles)), 1)
+        nearest = np.array([np.argmin(np.hypot(*(middles - centre).T)) for centre in elements.points.mean(1)])
+        stretch = np.linalg.norm(np.einsum("mkij,mj->mki", elements.section, tangents[nearest]), axis=-1).mean(1)
+        number = np.bincount(nearest, minlength=len(middles))
+        found = np.bincount(nearest, stretch, len(middles)) / np.maximum(number, 1)
         short = np.flatnonzero((found > 0) & (found < _COMPRESSED_STRETCH))
         pieces = [k for k in np.split(short, np.flatnonzero(np.diff(short) > 1) + 1) if len(k) >= _MIN_COLUMNS]
         if pieces:
@@ -88,16 +96,19 @@ class Examination:
                                        tuple(line[piece[0]].tolist()), tuple(line[piece[-1] + 1].tolist()))
 
     def _examine_attempt(self, x: Any, attempt: Any) -> None:
-        """Store the smallest J, the residual and the number of changes of contact status of the failed attempt."""
+        """Store the smallest J, the residual and the number of changes of contact status of the failed attempt.
+
+        x: work vector of unknowns. attempt: the last iterate. The values are stored in `facts`.
+        """
         problem, facts = self._problem, self.facts
         x.array_w[:] = attempt.x
         failed = body(problem, x, attempt.control)
         if failed and bool(np.isfinite(failed.J).all()):
             facts["failed_J"], facts["at_failed_J"], _ = _smallest_J(problem, failed)
         facts["residual"], facts["worst"], point = _residuals(problem, x, attempt.control)
-        if self._last is not None and self._shape:
-            self._marks.append(("largest out-of-balance force", _moved(problem, self._last, point)))
-        facts["flipped"] = _flips(problem, attempt)
+        if self._last is not None and self._elements:
+            self._marks.append(("largest out-of-balance force", _deformed_position(problem, self._last, point)))
+        facts["flipped"] = _status_changes(problem, attempt)
 
     def draw(self, file: Any, title: str) -> None:
         """Draw the deformed last good state with J, the worst points and the tools; rank 0 draws.
@@ -109,12 +120,12 @@ class Examination:
         Raises:
             InputError: the body is a membrane, which has no elements to draw, or there is no good state.
         """
-        if self._shape is None:
+        if self._elements is None:
             raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"
                              " thickness, and without a good state there is no shape")
         if self._problem.comm.rank == 0:
             os.makedirs(os.path.dirname(os.path.abspath(file)), exist_ok=True)
-            _draw(self._shape, self._marks, self._tools, title, file)
+            _draw(self._elements, self._marks, self._tools, title, file)
 
 
 def _layer(problem: Any, tag: int) -> str:
@@ -122,10 +133,11 @@ def _layer(problem: Any, tag: int) -> str:
     return next((name for name, t in problem.scene.mesh.layers.items() if t == tag), "")
 
 
-def _smallest_J(problem: Any, shape: Body) -> tuple[float, Place, tuple]:
-    """Return the smallest J, its place in the mesh, and its index in `shape.J`."""
-    at = np.unravel_index(int(np.argmin(shape.J)), shape.J.shape)
-    return float(shape.J[at]), place(problem.scene.mesh, shape.points[at], _layer(problem, shape.layers[at[0]])), at
+def _smallest_J(problem: Any, elements: Body) -> tuple[float, Place, tuple]:
+    """Return the smallest J, its place in the mesh, and its index in `elements.J`."""
+    at = np.unravel_index(int(np.argmin(elements.J)), elements.J.shape)
+    layer = _layer(problem, elements.layers[at[0]])
+    return float(elements.J[at]), place(problem.scene.mesh, elements.points[at], layer), at
 
 
 def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], Place, np.ndarray]:
@@ -157,7 +169,7 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
     return residual, place(problem.scene.mesh, point), point
 
 
-def _moved(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
+def _deformed_position(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
     """Return the deformed position in a state of the node at a reference point, shape (2,), length."""
     vectors, numbers = problem.forms.space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
@@ -176,7 +188,7 @@ def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
     return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.present]
 
 
-def _flips(problem: Any, attempt: Any) -> int | None:
+def _status_changes(problem: Any, attempt: Any) -> int | None:
     """Return the number of points whose contact status changed in the last iteration; None without contact."""
     if not problem.present:
         return None
@@ -190,16 +202,16 @@ def _flips(problem: Any, attempt: Any) -> int | None:
     return problem.comm.allreduce(count, MPI.SUM)
 
 
-def _draw(shape: Body, marks: list, tools: list, title: str, file: Any) -> None:
+def _draw(elements: Body, marks: list, tools: list, title: str, file: Any) -> None:
     """Draw deformed elements coloured by J, marked points (label, position) and tools to a file."""
     from matplotlib.collections import PolyCollection
-    size = np.ptp(shape.outline, axis=(0, 1))
+    size = np.ptp(elements.outline, axis=(0, 1))
     wide = size[0] > 4 * size[1]
     height = float(np.clip(7.0 * size[1] / size[0], 2.0, 7.0)) + 1.2
     figure, axes = figures.figure(width=8.0, height=height)
-    J = shape.J[np.arange(len(shape.J)), np.argmax(np.abs(shape.J - 1), axis=1)]
+    J = elements.J[np.arange(len(elements.J)), np.argmax(np.abs(elements.J - 1), axis=1)]
     reach = float(np.clip(np.abs(J - 1).max(), 1e-3, 1.0))
-    drawn = PolyCollection(list(shape.outline), array=J, cmap="RdBu", edgecolors="0.35", linewidths=0.4,
+    drawn = PolyCollection(list(elements.outline), array=J, cmap="RdBu", edgecolors="0.35", linewidths=0.4,
                            clim=(1 - reach, 1 + reach))
     axes.add_collection(drawn)
     for (label, point), mark, colour in zip(marks, "osD^", ("tab:red", "black", "tab:purple", "tab:green")):
@@ -216,5 +228,5 @@ def _draw(shape: Body, marks: list, tools: list, title: str, file: Any) -> None:
     figure.draw_without_rendering()                        # the aspect changes the limits
     axes.autoscale(False)
     low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    figures.tools(axes, tools, low, high, mirror=shape.outline[..., 0].min() > -1e-9 * size[0])
+    figures.tools(axes, tools, low, high, mirror=elements.outline[..., 0].min() > -1e-9 * size[0])
     figure.savefig(file, dpi=150)

@@ -94,7 +94,10 @@ class Problem(Stages, Units):
 
     @property
     def temperature(self) -> Temperature | None:
-        """Temperature of the body at the last accepted state, in `state_context` at its state; None if not given."""
+        """Temperature of the body at the last accepted state; None if the scene has no temperature.
+
+        Inside `state_context` it is the temperature at the state of the context.
+        """
         return self.forms.temperature
 
     def examine(self, last: Any, attempt: Any) -> Examination:
@@ -128,10 +131,11 @@ class Problem(Stages, Units):
         for multiplier, row in zip(multipliers, stage.active.rows, strict=True):
             values += multiplier * row
         constrained = self.constrained
-        values[constrained] = fields[constrained] - stage.place - stage.rate * control
-        self.fill(out, values, [self._dot(row, fields) - mean if present else multiplier
-                                for row, mean, present, multiplier in
-                                zip(stage.active.rows, stage.means, stage.active.present, multipliers, strict=True)])
+        values[constrained] = fields[constrained] - stage.base - stage.rate * control
+        constraints = stage.active
+        self.fill(out, values, [self._dot(row, fields) - mean if active else multiplier
+                                for row, mean, active, multiplier in
+                                zip(constraints.rows, stage.means, constraints.means_active, multipliers, strict=True)])
         if stage.unbalanced is not None:
             out.array_w += (control - 1) * stage.unbalanced
 
@@ -192,9 +196,10 @@ class Problem(Stages, Units):
         return self.assemble(self._residual)
 
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the internal minus the external forces, contact included, for fields that are set already.
+        """Return the internal minus the external forces, contact included, at the state to which the forms are set.
 
-        fields: locally owned unknowns, shape (n,).
+        fields: the locally owned field unknowns of this state, shape (n,). control: its load parameter (control). The
+        forces are dimensionless, for the same unknowns, shape (n,).
         """
         values = self.assemble(self._residual)
         for contact in self.present:
@@ -214,7 +219,7 @@ class Problem(Stages, Units):
         self.set_state(x, control)
         return not self.admissible.holds()
 
-    def furthest_volume_ratio(self, state: Any) -> WorstValue | None:
+    def extreme_volume_ratio(self, state: Any) -> WorstValue | None:
         """Return the volume ratio with the largest |ln J| in a state; collective.
 
         Args:
@@ -224,7 +229,7 @@ class Problem(Stages, Units):
             The volume ratio with its reference position; None for a membrane.
         """
         with self.state_context(state):
-            return self.admissible.furthest_volume_ratio()
+            return self.admissible.extreme_volume_ratio()
 
     def volume_error_away(self, state: Any, places: np.ndarray, distance: float) -> float:
         """Return the root mean square of the volume change J - 1 over elements far from given positions; collective.

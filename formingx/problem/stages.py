@@ -24,17 +24,18 @@ class _Stage(NamedTuple):
     Attributes:
         setting: the `StepData`.
         active: the active constraints.
-        constrained: locally owned constrained unknowns, shape (n,).
-        place: values of the locally owned constrained unknowns at control 0, shape (n,).
+        constrained: local numbers of the n locally owned constrained unknowns, shape (n,).
+        base: values of these unknowns at control 0, shape (n,).
         rate: derivative of these values with respect to the control, shape (n,).
-        means: prescribed values of the constrained means.
-        unbalanced: forces f of fading, locally owned entries of F: (1 - control) f is subtracted from F; or None.
+        means: prescribed mean displacement for each `ConstrainedMean` of the scene, dimensionless.
+        unbalanced: forces f that the change of step data leaves out of balance, locally owned entries. While they fade,
+            (1 - control) f is subtracted from the residual F. None without fading.
     """
 
     setting: StepData
     active: Active
     constrained: np.ndarray
-    place: np.ndarray
+    base: np.ndarray
     rate: np.ndarray
     means: list[float]
     unbalanced: np.ndarray | None = None
@@ -151,7 +152,7 @@ class Stages(Vectors):
             Locally owned entries, shape (n,).
         """
         values = np.zeros(self.x.getLocalSize())
-        values[self.constrained] = self._stage.place + self._stage.rate * control
+        values[self.constrained] = self._stage.base + self._stage.rate * control
         return values
 
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:

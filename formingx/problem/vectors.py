@@ -33,12 +33,12 @@ class Vectors(Histories):
 
     @cached_property
     def _fields(self) -> np.ndarray:
-        """Fields of the forms on this rank, with ghosts: the memory of `forms.w`."""
+        """Fields of the forms on this rank, with ghosts: writable view of the unknowns of `forms.w`."""
         return np.asarray(self.forms.w.x.array)
 
     @cached_property
     def _control(self) -> np.ndarray:
-        """Control of the forms, shape (): the memory of `forms.control`."""
+        """Control of the forms, shape (): writable view of the value of `forms.control`."""
         return np.asarray(self.forms.control.value)
 
     @cached_property
@@ -57,12 +57,14 @@ class Vectors(Histories):
         self.set_fields(x)
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        r"""Return the inner product of two displacement fields with a lumped mass matrix.
+        r"""Return the inner product of two dimensionless displacement fields, by a lumped mass matrix.
 
         .. math:: \frac{1}{V} \int_V a \cdot b \, dV
 
+        V is the reference volume. Pressures and multipliers do not count.
+
         Args:
-            a: first vector of unknowns.
+            a: first vector of unknowns, whose displacements are divided by the length scale L.
             b: second vector of unknowns.
 
         Returns:

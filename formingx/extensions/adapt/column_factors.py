@@ -85,13 +85,13 @@ def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) ->
     problem = path.problem
     columns, outline = problem.scene.mesh.columns, Outline(problem.forms)
     faces = [outline.mask(contact.contact.on) for contact in problem.contacts]
-    column = _nearest_column(outline.rest[:, 2], middles[[0, -1]])
+    column = _nearest_column(outline.reference_edges[:, 2], middles[[0, -1]])
     begin = columns.place(columns.ends[:-1])[[0, -1]]
     sides = []                                               # edges column by column, mask of reversed ones
     for name, first in zip(columns.faces, begin):
         edges = np.flatnonzero(outline.mask(name))
         edges = edges[np.unique(column[edges], return_index=True)[1]]               # ghosts appear twice
-        a, b = (np.linalg.norm(outline.rest[edges, k] - first, axis=1) for k in (0, 1))
+        a, b = (np.linalg.norm(outline.reference_edges[edges, k] - first, axis=1) for k in (0, 1))
         sides.append((edges, a > b))
     for state in path.states:
         with problem.state_context(state):

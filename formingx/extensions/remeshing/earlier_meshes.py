@@ -111,7 +111,7 @@ class _OutlineProjection:
     """
 
     def __init__(self, problem: Any):
-        self._edges = Outline(problem.forms).rest
+        self._edges = Outline(problem.forms).reference_edges
         self._near = _OUTLINE_DISTANCE * np.linalg.norm(self._edges[:, 1] - self._edges[:, 0], axis=1)
 
     @cached_property

@@ -171,7 +171,7 @@ class _AlwaysAdmissible:
         """Return True: the volume ratio of a membrane is positive in every state."""
         return True
 
-    def furthest_volume_ratio(self) -> None:
+    def extreme_volume_ratio(self) -> None:
         """Return None: the volume of a membrane is constant."""
         return None
 

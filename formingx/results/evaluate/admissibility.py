@@ -97,7 +97,7 @@ class AdmissibilityCheck:
         if self._solid:
             self._outline = Outline(problem.forms)
             self._faces = [self._outline.mask(contact.contact.on) for contact in problem.contacts]
-            self._reference_lengths = _lengths(self._outline.rest)
+            self._reference_lengths = _lengths(self._outline.reference_edges)
 
     def reason(self, state: State) -> str:
         """Return the reason why a state is inadmissible, or "" if it is admissible; collective.
@@ -237,7 +237,7 @@ class AdmissibilityCheck:
             lengths: their lengths, shape (m,).
             state: the state.
         """
-        weight, reference = self._problem.scene.kinematics.weight, self._outline.rest
+        weight, reference = self._problem.scene.kinematics.weight, self._outline.reference_edges
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.present or contact.contact.points != "nodes" or not face.any():
                 continue

@@ -83,7 +83,7 @@ def extreme_ratio(path: Any) -> list[Finding]:
     Args:
         path: the computed `Path`.
     """
-    furthest = path.problem.furthest_volume_ratio(path.last)
+    furthest = path.problem.extreme_volume_ratio(path.last)
     J = 1.0 if furthest is None else furthest.value
     if 1 / _MAX_VOLUME_RATIO < J < _MAX_VOLUME_RATIO:
         return []
