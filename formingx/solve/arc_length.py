@@ -115,9 +115,9 @@ class Curve(StateSolver):
             old: accepted state at the start of the step.
             length: arc length at which the guess lies, dimensionless.
             equation: the constraint, such as "quantity = target".
-            predictor: as in `step`.
-            earlier: as in `step`.
-            bend: as in `step`.
+            predictor: function that replaces the guess of x, for a step in time (`Predictor`), or None.
+            earlier: state before `old` whose parabola with `old` gives the guess; None: the guess lies on the tangent.
+            bend: correction that is added to the guess (`Bend`), or None.
             kind: kind of the new state (`State.kind`).
 
         Returns:
@@ -132,7 +132,8 @@ class Curve(StateSolver):
                bend: Bend | None = None) -> tuple[Array, float]:
         """Return the guess (x, control) of a step from `old`; x: locally owned entries, shape (n,).
 
-        length, earlier, bend: as in `step`.
+        length: arc length of the step. earlier: state before `old` whose parabola with `old` gives the guess; None: the
+        guess lies on the tangent. bend: correction that is added to the guess, or None.
         """
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if earlier is not None:
@@ -147,7 +148,7 @@ class Curve(StateSolver):
 
     def _solve_from(self, x: Array, control: float, constraint: Constraint, kind: str, old: State,
                     predictor: Predictor | None) -> State:
-        """Return the state of a given kind at which a constraint holds, from the guess (x, control).
+        """Return the state at which a constraint holds, from the guess (x, control), with the `State.kind` "kind".
 
         Away from limit points, the predictor replaces the guess of x, and tangents of earlier iterations are kept. Near
         a limit point tangents must be new, since limit points are located by the tangents of neighbouring states. old:
@@ -278,10 +279,13 @@ class Curve(StateSolver):
                          targets: Sequence[tuple[Target, Quantity]]) -> list[State]:
         """Put points that penetrate tools in three dimensions into contact, and solve again for the end of a step.
 
-        A point closes at the position where it met the tool. At a target the points of all tools are considered, and
-        the state meets the target again, with renewed contact pressures (`StepLimit.renew_pressure`). Without friction
-        the state then does not depend on the steps before it. If this solution fails, the solution before it is
-        returned. Other states are solved for again at the same control, and only for points of tools with friction.
+        A point closes at the position where it met the tool.
+
+        * A state that meets a target meets it again afterwards. The points of all tools are considered, and contact
+          pressures are renewed (`StepLimit.renew_pressure`). Without friction this state then does not depend on the
+          steps before it. If the solution with renewed pressures fails, the solution before it is returned.
+        * A state that meets no target is solved for again at the same control. Only the points of tools with friction
+          are considered.
 
         Args:
             old: accepted state at the start of the step.

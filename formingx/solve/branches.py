@@ -58,8 +58,10 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
 
 
 def _follow_from_states(curve: Curve, states: Sequence[State]) -> bool:
-    """Return True if branch points are found without a factorisation: states have an orientation, or there is a
-    history.
+    """Return True if branch points are found without further factorisations.
+
+    This is so if the states have a `State.orientation`, the sign of the determinant of the tangent. For a problem with
+    history variables no branch points are sought.
     """
     return curve.problem.has_history or any(state.orientation for state in states)
 

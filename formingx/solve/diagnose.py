@@ -27,7 +27,8 @@ class Limits:
             compared.
         singular: ratio of both condition numbers above which the tangent counts as singular.
         round_off: condition number above which hardly any of 16 digits is correct.
-        slowing: slope of the control over its largest value on the path, below which a limit point is extrapolated.
+        slowing: derivative of the control with respect to arc length, over the largest such derivative on the path,
+            below which a limit point ahead is extrapolated.
         material: ratio of I1 - 3 to its limit in the material, above which the material counts as a cause.
         volume: volume ratio J below which an element is about to turn inside out.
         shape: shape quality of a deformed element, over its value in the reference configuration, below which the

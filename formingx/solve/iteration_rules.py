@@ -18,19 +18,19 @@ class Newton:
         at_rest: number that is added to the norm of the displacements in the relative correction, dimensionless. On a
             tool whose force grows as the square of the penetration, corrections near the reference configuration are
             as large as displacements.
-        hurried: largest number of iterations in which the active set of a contact with history variables may change, if
-            a shorter step follows a failure.
+        hurried: largest number of iterations while the active set changes, in place of `Tolerances.settling`. It holds
+            for contact with history variables in a step that is repeated with a smaller length if it fails.
         small: size of a correction (dimensionless displacement) below which growing corrections are no sign of
             divergence while the active set changes.
-        exempt: number of iterations with a small correction and a new active set that do not count in
-            `newton.Tolerances.settling`. For example, a hundred points of a slack sheet separate one by one from a flat
-            plug. With history variables no iteration is exempt.
+        exempt: number of iterations that do not count in `newton.Tolerances.settling`, of those whose small correction
+            led to a new active set. For example, a hundred points of a slack sheet separate one by one from a flat
+            plug. With history variables all iterations count.
         cycles: number of returns to an earlier active set at which the iteration counts as cycling. Converged
             iterations took up to 4.
         diverged: relative correction above which three corrections in a row mean divergence, with contact or without.
             In converged iterations they stayed below 0.1.
-        left_alone: number, counted from 0, of an iteration without a local solve of contact. This iteration often
-            corrects the errors of the iteration before it.
+        left_alone: index of the iteration, counted from 0, in which the local contact problem is never solved. The
+            full correction often removes the errors of the iteration before it.
         chords: number of chord iterations that together cost less than one iteration with a new tangent. A chord
             iteration takes a residual and a solve, about a sixth of the time.
         slow: ratio of the residuals after and before an iteration, above which a tangent is not kept. Round-off could
@@ -71,10 +71,12 @@ class ActiveSetChanges:
         self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def compare(self, moved: float) -> None:
-        """Compare the present active set with earlier ones; called once after each residual.
+        """Compare the active set of this iteration with earlier ones, and update the attributes.
+
+        Call it once after each residual.
 
         Args:
-            moved: size of the last correction.
+            moved: size of the last correction, dimensionless; it decides whether a new active set counts in `found`.
         """
         self._iteration += 1
         now = self._problem.active_set
@@ -94,10 +96,10 @@ class ActiveSetChanges:
 class ModifiedNewton:
     """Rule of the modified Newton method: a tangent is kept while chord iterations cost less than a new one.
 
-    Source: Ortega and Rheinboldt 1970, section 7.1. The fall of an iteration is the residual after it over the residual
-    before it. The first iteration of a step may use the tangent of an earlier state. Its expected fall is the fall in
-    the last step that began with an earlier tangent, halved for every step since. Earlier tangents are thus tried
-    again.
+    Source: Ortega and Rheinboldt 1970, section 7.1. Let q be the residual after an iteration over the residual before
+    it. The q expected of the next chord iteration is the q of the last iteration. The first iteration of a step may use
+    the tangent of an earlier state. Its expected q is the q of the last first iteration that used an earlier tangent,
+    halved for each step since then. Earlier tangents are thus tried again after some steps.
 
     Args:
         settings: settings of Newton's method.

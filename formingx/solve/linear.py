@@ -23,11 +23,13 @@ class _Scaling(IntEnum):
 
 @dataclass(frozen=True)
 class Condensation:
-    """Sizes from which solutions are condensed (`CondensedColumns`), and zeros of right-hand sides passed over.
+    """Smallest sizes of a linear system for which the zeros of its right-hand sides save time in MUMPS.
 
     Attributes:
-        columns: number of right-hand sides from which entries of the inverse cost less than full solutions.
-        rows: number of unknowns, per nonzero entry of a right-hand side, from which the difference counts.
+        columns: number of right-hand sides from which a few entries of the inverse matrix cost less than full solutions
+            (`CondensedColumns`).
+        rows: number of unknowns from which entries of the inverse are used. Right-hand sides are given to MUMPS as
+            sparse columns if there are at least this many unknowns for each nonzero entry.
     """
 
     columns: int = 12

@@ -28,13 +28,15 @@ class QuantitySteps:
     """Settings of steps in time along a prescribed amplitude of an output quantity.
 
     Attributes:
-        stretched: number of step lengths within which a step ends at the next time to be met, so that the last step is
-            not much shorter than the others.
+        stretched: multiple of the step length. A step ends at the next time to be met exactly if this time lies within
+            this multiple, so that no short step is left over.
         cut: largest factor by which the length of a step is reduced when the step is repeated.
-        still: relative change of the control in a step below which the control counts as constant.
+        still: relative change of the control in a step, below which the control counts as constant. Also the arc length
+            of a step, below which no limit point is sought in it.
         located: tolerance of the time of a limit point, over the duration of its step.
         met: relative tolerance of a target that is met inside a step.
-        contact: length that gap closure allows to a step, over the length of the step, below which the step fails.
+        contact: fraction of a step up to which the closure of gaps must admit it (`StepLimit.length`). A step that is
+            admitted for a smaller fraction fails.
     """
 
     stretched: float = 1.5

@@ -90,7 +90,8 @@ class Tolerances:
             predicts for the next iteration.
         residual: tolerance of the norm of F relative to the support forces (`relative`).
         iterations: largest number of iterations with the same active set of contact.
-        settling: largest number of iterations while the active set changes, without exempt ones (`Newton.exempt`).
+        settling: largest number of iterations while the active set changes. Of iterations whose small correction led
+            to a new active set, `Newton.exempt` do not count.
 
     Raises:
         InputError: a value that is not greater than 0.
@@ -112,18 +113,24 @@ class Tolerances:
     def met(self, corrections: list[float], residuals: list[float], chord: bool = False, smooth: bool = False) -> bool:
         """Return True if an iteration has converged, to its tolerances or to round-off.
 
-        Corrections are round-off below 1e-11, or below 1e-7 if they no longer decrease. The residual may then exceed
-        its tolerance by a factor of 1000. With corrections below the tolerance, a residual of any size that no longer
-        decreases is round-off. In a thin sheet (radius over thickness 1e6) a stiff penalty times the round-off of the
-        displacements can exceed the support forces.
+        One of these conditions must hold. A value no longer decreases if it is above 0.3 times the value before.
+
+        * The correction predicted for the next iteration and the residual are below their tolerances.
+        * The last correction is below its tolerance, and the residual no longer decreases. In a thin sheet (radius over
+          thickness 1e6) a stiff penalty times the round-off of displacements can exceed the support forces.
+        * The residual is below 1000 times its tolerance. The last correction is below 1e-11, or it is below 1e-7 and no
+          longer decreases.
+        * F is `smooth`. In the last five iterations corrections were below 1e-8, and residuals differed by less than a
+          factor of 3.
+
+        After a chord iteration only the first condition counts.
 
         Args:
             corrections: relative corrections of all iterations so far.
             residuals: relative residuals before each iteration and after the last one.
             chord: True if the last iteration was a chord iteration. Its convergence is linear: the next correction is
                 predicted from the last ratio of residuals or corrections, and doubled.
-            smooth: True if F has no kinks, between which an iteration could oscillate. Residuals that differ by less
-                than a factor of 3 in five iterations, with corrections below 1e-8, are then round-off.
+            smooth: True if F has no kinks, between which an iteration could oscillate.
 
         Returns:
             True if no further iteration is needed.
@@ -149,7 +156,8 @@ class Tolerances:
 
 
 class Drag(Protocol):
-    """Interface of forces that are added to F, such as viscous forces."""
+    """Interface of forces that are added to the residual F, such as viscous forces; F has internal forces as positive.
+    """
 
     def forces(self, x: Array) -> Array:
         """Return the forces.
@@ -177,7 +185,8 @@ class BorderedNewton:
         tolerances: convergence criteria.
         norm: function (change of x, change of the control) that returns the size of a correction, dimensionless.
         settings: settings of Newton's method.
-        drag: forces that are added to F, or None. With added forces the constraint must be `fixed`.
+        drag: forces that are added to F, such as viscous forces, or None. With them the control must be constant: the
+            constraint must be `fixed`.
 
     Attributes:
         solver: direct solver with the factors of the last tangent dF/dx.
@@ -235,7 +244,8 @@ class BorderedNewton:
     def _factorise(self, x: PETSc.Vec, control: float, ahead: bool = False, rescale: bool = True) -> bool:
         """Factorise dF/dx at (x, control) and compute `F_control`; return False if dF/dx is singular.
 
-        ahead: as in `tangent`. rescale: True for a new scaling of rows and columns by MUMPS.
+        ahead: True for the one-sided derivatives towards the next step, where F has a kink. rescale: True for a new
+        scaling of rows and columns by MUMPS.
         """
         matrix = self.problem.tangent(x, control, ahead)
         if self._drag:
@@ -247,10 +257,11 @@ class BorderedNewton:
         return good
 
     def update_ahead(self, x: PETSc.Vec, control: float) -> bool:
-        """Update the vector `b` = dx/dcontrol at a converged solution to the tangent ahead, without a factorisation.
+        """Update the vector `b` = dx/dcontrol at a converged solution to the next step, without a factorisation.
 
-        The tangent ahead differs from the factorised one in the stiffness of a few contact points, which Woodbury's
-        formula takes into account.
+        Where F has a kink, its one-sided derivative towards the next step differs from the factorised tangent. The
+        difference is the stiffness of a few contact points, such as those whose gap has just closed. Woodbury's formula
+        adds it.
 
         Args:
             x: unknowns of the solution.
@@ -267,13 +278,13 @@ class BorderedNewton:
         return True
 
     def solve_ahead(self, E: Array) -> Array | None:
-        """Return K^-1 E for the tangent K that `tangent` or `update_ahead` computed last.
+        """Return K^-1 E for the tangent K towards the next step, which `tangent` or `update_ahead` computed last.
 
         Args:
             E: right-hand sides as columns, locally owned rows, shape (n, m).
 
         Returns:
-            Solutions, locally owned rows, shape (n, m); None if the updated tangent is singular.
+            Solutions K^-1 E, locally owned rows, shape (n, m); None if the updated tangent is singular.
         """
         V = self.solver.solve_all(E)
         return self._update(V, 0.0) if self._update else V
@@ -379,7 +390,7 @@ class BorderedNewton:
         """Compute the correction `a` = -K^-1 F with the tangent K at (x, control); return False if K is singular.
 
         The vector `b` = dx/dcontrol is computed, too, except with a `Drag` and in a chord iteration. chord: True to use
-        the factors of an earlier tangent. rescale: as in `_factorise`.
+        the factors of an earlier tangent. rescale: True for a new scaling of rows and columns by MUMPS.
         """
         if not chord and not self._factorise(x, control, rescale=rescale):
             return False

@@ -22,10 +22,11 @@ from .arc_length import Predictor
 from .branches import warn_of_branches
 from .diagnose import diagnose, not_reached
 from .equations import Array, Attempt, Quantity
+from .jump_rules import JumpRules, at_limit_points, snaps
 from .newton import Failure, fixed, tangents
 from .progress import Progress, RunTargets
 from .record import InadmissibleState, Record
-from .snap_through import NoEquilibrium, SnapThrough, at_limit_points, separate_points, snap_through, snaps, was_passed
+from .snap_through import SnapThrough, separate_points, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
 
@@ -68,13 +69,11 @@ class Run:
                  at_limit_point: str | None = None, accuracy: float = 2e-3, label: str = "",
                  requested: Target | None = None):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
-        self._limit_rule = at_limit_point or ""
         self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
         self.targets = RunTargets(self.curve, targets, requested)
         self._step, self._began = step, time.perf_counter()
-        self._ahead = self.settings.snap_through.ahead      # change of the control in a snap-through
-        self._no_equilibrium_at = np.nan                    # control at which a snap-through found no equilibrium
+        self._jumps = JumpRules(self.curve, self.targets, self.settings.snap_through, at_limit_point or "")
         self._turned: list[State] = []                      # first state of a run that goes back along the path
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
@@ -99,7 +98,7 @@ class Run:
                 kept = self._continue(may_turn)
             else:
                 self._accept(self.targets.directed_to_target(start, first=not record.states))
-            self._limit_rule = self._limit_rule or at_limit_points(self.problem, self._is_released)
+            self._jumps.rule = self._jumps.rule or at_limit_points(self.problem, self._is_released)
             if self._step is None or asdict(self._step) == kept.get("given"):
                 self.step = StepControl(**kept.get("step", {}))
             else:
@@ -114,9 +113,9 @@ class Run:
                 for state in self._next(states[-1]):
                     self._accept(state)
                     self._stop_if(self.targets.jumped_past(state))
-                    if state.kind == "limit point" and self._limit_rule == "stop":
+                    if state.kind == "limit point" and self._jumps.rule == "stop":
                         record.ended = f"the {self._control_name} has a limit point at {record.describe(state)}"
-                    if record.ended or self.problem.has_history or self._limit_rule == "snap_through":
+                    if record.ended or self.problem.has_history or self._jumps.rule == "snap_through":
                         break                           # the next step starts from this state
                     if not self.targets.is_open() and state.met is self.targets.until:
                         break
@@ -143,20 +142,6 @@ class Run:
         return self.targets.until.name != "process_time" or bool(self.problem.setting.rate[-1])
 
     @property
-    def _may_jump(self) -> bool:
-        """True if the body may snap through: by the rule at limit points, or where a kink of F may end the path."""
-        may_end = self.problem.has_history or self.problem.has_kinks
-        return self._limit_rule in ("snap_through", "continue_volume") or self._limit_rule == "continue" and may_end
-
-    @property
-    def _jumps_soon(self) -> bool:
-        """True if a snap-through is tried after two failed steps, False if only after the smallest step has failed.
-
-        False for a pressure on a body with history variables, since slip in the viscous motion changes the final state.
-        """
-        return self._limit_rule in ("snap_through", *["continue_volume"] * (not self.problem.has_history))
-
-    @property
     def _sense(self) -> float:
         """Sign, 1 or -1, of the change of the control at the first state of the run."""
         return float(np.sign(self.states[0].slope)) or 1.0
@@ -172,10 +157,11 @@ class Run:
         return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
     def _continue(self, may_turn: bool) -> dict[str, Any]:
-        """Continue the run of the last states of the record with the same step data; return its `State.stepping`.
+        """Continue the run of the last states of the record; return the data stored with its last step.
 
-        The result is empty if no state has such data. With `may_turn` the run may go back along the path, except to a
-        pressure, which may be reached further along the path, too.
+        These data (`State.stepping`) are the step control, the counts and the target of the run, {} without them.
+        may_turn: True if the run may go back along the path to a new target. The target must not be a pressure, which
+        may be reached further along the path, too.
         """
         record, last = self.record, self.record.last
         number = record.restore()                           # of states with the present step data
@@ -192,8 +178,8 @@ class Run:
         met = [s.met[:2] for s in self.states if s.met]
         targets.open = [(target, quantity) for target, quantity in targets.open if target[:2] not in met]
         kept = next((s.stepping for s in reversed(self.states) if s.stepping), {})
-        self._ahead, no_equilibrium_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
-        self._no_equilibrium_at = np.nan if no_equilibrium_at is None else no_equilibrium_at
+        self._jumps.change, no_equilibrium_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
+        self._jumps.no_equilibrium_at = np.nan if no_equilibrium_at is None else no_equilibrium_at
         return kept
 
     def _elapsed(self) -> float:
@@ -204,19 +190,21 @@ class Run:
     def _complete_step(self) -> None:
         """Complete a step in the record, with the data with which the run continues."""
         self.record.counts.seconds += self._elapsed()
-        no_equilibrium_at = None if np.isnan(self._no_equilibrium_at) else float(self._no_equilibrium_at)
+        failed_at = float(self._jumps.no_equilibrium_at)
+        jumps = self._jumps.change, None if np.isnan(failed_at) else failed_at
         self.record.complete_step(self.step, self.targets.until, given=self._step and asdict(self._step),
-                                  accuracy=self._accuracy, jumps=(self._ahead, no_equilibrium_at))
+                                  accuracy=self._accuracy, jumps=jumps)
 
     def _next(self, old: State) -> list[State]:
         """Return the states of the next step from `old`, in order; the last one is its end, or a target within reach.
 
-        A failure halves the step. If short steps fail, or the path leads back, a snap-through is tried. Only the
-        smallest step triggers it at a first state with history variables, and near the control of a failed one.
+        A failure halves the step. A snap-through is tried if the path leads back, if short steps fail, or if the
+        smallest step has failed. Short steps do not trigger it at a first state with history variables, nor near the
+        control at which an earlier snap-through reached no equilibrium.
         """
         first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
-        if snaps(self.curve, old, self._limit_rule, self._sense):
+        if snaps(self.curve, old, self._jumps.rule, self._sense):
             return self._snap(old)
         events: Any = limit and limit.predict(self.curve, old)                         # type: ignore[arg-type]
         self._trial = TrialStep(old.x, old.control, old.direction, old.slope, 0.0, events)
@@ -240,9 +228,9 @@ class Run:
                 good, failed = self.step.failed(), failed + (not isinstance(failure, _PassedState))
                 self._failed(failure.reason, self.step.length)
                 self._trial = self._trial._replace(events=None if failed > 1 else self._trial.events)
-                early = self._jumps_soon and failed > 1 and length < lengths[0] and not (
-                    old.kind == "start" and self.problem.has_history or self._found_no_equilibrium_near(old))
-                if self._may_jump and (not good or early):
+                early = self._jumps.tried_early and failed > 1 and length < lengths[0] and not (
+                    old.kind == "start" and self.problem.has_history or self._jumps.found_no_equilibrium_near(old))
+                if self._jumps.allowed and (not good or early):
                     lengths.pop(0)
                     for ahead in (reach,) if good else (last, 0.0):
                         with contextlib.suppress(Failure):
@@ -265,8 +253,8 @@ class Run:
               reach: float, end: float | None = None) -> list[State]:
         """Return the states of one step from `old`, of a given arc length, or to a target at the arc length `reach`.
 
-        quantity: output quantity of the target. end: control at the end of the step, in place of its length, or None.
-        A step that fails raises `Failure`, and a step that is too long raises `Cutback`.
+        target: target within the step, or None. quantity: its output quantity. end: control at the end of the step, in
+        place of its length, or None. A failed step raises `Failure`, and a step that is too long raises `Cutback`.
         """
         limit = self.problem.limit
         bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
@@ -286,14 +274,14 @@ class Run:
         if rejection:
             part = min(max(rejection.fraction, 0.1), self.settings.snap_through.most_of_step(self.curve.iterations))
             raise Cutback(rejection.reason, part) if rejection.fraction else _PassedState(rejection.reason, [])
-        if self._limit_rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
+        if self._jumps.rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _PassedState("the iteration fell back to a part of the path that was passed already", [])
         error, variables = self._error_in_time(new), self.problem.history_variables
         try:
             new = separate_points(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
-            states, self._ahead = self._states_within(old, new), self.settings.snap_through.ahead
+            states, self._jumps.change = self._states_within(old, new), self.settings.snap_through.ahead
         except Failure:
             self.problem.history_variables = variables
             raise
@@ -330,7 +318,7 @@ class Run:
 
         If a body with constant loads reaches no equilibrium, the list is empty and the run ends.
         """
-        work_sign = self._sense * (self._limit_rule == "continue_volume")
+        work_sign = self._sense * (self._jumps.rule == "continue_volume")
         if old.kind != "limit point":
             with contextlib.suppress(Failure):
                 return [self._jump(old, self.settings.snap_through.lengths[-1], work_sign=work_sign)]
@@ -346,44 +334,21 @@ class Run:
     def _jump(self, old: State, length: float, step: float = 0.0, work_sign: float = 0.0) -> State:
         """Return the state after a snap-through from `old`; raise `Failure` if there is none.
 
-        length: arc length of the predictor on the tangent of `old`. step: length of the first attempt of the step.
-        work_sign: as in `snap_through`. With length 0 and history variables several changes of the control are tried,
-        since contact may converge at one only. A fading force is removed at once.
+        length: arc length along the tangent of `old` at which the motion starts. step: length of the first attempt of
+        the step. work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either.
         """
-        fading, settings = self.problem.setting.fading, self.settings.snap_through
-        others = (settings.ahead, settings.furthest) if length == 0 and self.problem.has_history and not fading else ()
-        for ahead in dict.fromkeys((self._ahead, *others)):
-            self._ahead = ahead
-            try:
-                change = self._sense * max(ahead, length * abs(old.slope))
-                change = 1 - old.control if fading else self.targets.short_of_targets(old, change)
-                new = snap_through(self.curve, old, change, length > 0 and not fading, settings,
-                                   self._max_solutions(old), lambda: self._progress.limited("a jump", self.step.length),
-                                   work_sign, self.states)
-                break
-            except Failure as last:
-                failure = last
-                if isinstance(last, NoEquilibrium):
-                    self._no_equilibrium_at = old.control
-        else:
-            raise failure
-        self._ahead = min(10 * self._ahead, settings.furthest)
+        new = self._jumps.jump(old, length, self._sense, self.states,
+                               lambda: self._progress.limited("a jump", self.step.length), work_sign)
         new = self.curve.close_penetrated(old, [replace(new, met=self.targets.met_by(new))], self.targets.open)[0]
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
 
-    def _found_no_equilibrium_near(self, old: State) -> bool:
-        """Return True if an earlier snap-through, at nearly the control of `old`, reached no equilibrium."""
-        return abs(old.control - self._no_equilibrium_at) < self.settings.snap_through.furthest
-
-    def _max_solutions(self, old: State) -> int:
-        """Return the largest number of viscous solutions of a snap-through from a state."""
-        most = self.settings.snap_through.solutions
-        return most // 5 if self._found_no_equilibrium_near(old) else most
-
     def _check_progress(self) -> None:
-        """Give up if many states came no nearer to the target, or no process reaches such a value of the control."""
+        """Give up if the last states came no nearer to the target, or the control has an implausible value.
+
+        To give up is to raise a `ConvergenceError`.
+        """
         control = self.record.last.control
         reason = self.problem.implausible(control)
         if reason is not None:
@@ -438,7 +403,11 @@ class Run:
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
     def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "", hint: str = _TRY) -> None:
-        """Raise the `ConvergenceError` of a run that ends before its target, for the reason `why`, with a diagnosis."""
+        """Raise the `ConvergenceError` of a run that ends before its target, for the reason `why`, with a diagnosis.
+
+        attempt: end of the failed Newton iteration, or None. pace: progress of a run that used up its steps, as text.
+        hint: advice as text, used if the diagnosis has none.
+        """
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
                          self.targets.until.value if self.targets.of_control and self._target_is_control else None)

@@ -1,4 +1,4 @@
-"""Step data of the pieces of a stage: one controlled item, or tables of amplitudes against time."""
+"""Step data of a stage: one controlled load, support or contact, or tables of amplitudes against time."""
 
 from __future__ import annotations
 
@@ -13,17 +13,19 @@ from .stepping import SAME_TIME
 
 def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
             clocked: bool = True) -> tuple[list[float], list[float], float]:
-    """Return the amplitudes of a piece of a stage in which the amplitude of one item is the control.
+    """Return step data in which the amplitude of one load, support or contact is the control.
+
+    All other amplitudes stay constant. With the control lambda, an amplitude is base + rate lambda.
 
     Args:
-        amplitudes: present amplitudes of all items, then the process time.
-        scales: for each item, its value in the user's units over its amplitude.
-        numbers: numbers of the controlled item, then of the items that move with it.
+        amplitudes: present amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
+        scales: value of each in the user's units at amplitude 1, in the same order.
+        numbers: index of the controlled one in `Scene.items`, then of the others that move with it.
         stage: the stage, whose speed or duration relates the process time to the control.
         clocked: True if process time may pass while the control changes.
 
     Returns:
-        (`StepData.base`, `StepData.rate`, present value of the control).
+        Base and rate of each amplitude, then of the process time (`StepData`); present value of the control.
     """
     base, rate = list(amplitudes), [0.0] * len(amplitudes)
     control, scale = base[numbers[0]], scales[numbers[0]]
@@ -43,20 +45,20 @@ def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers:
 
 def table_step_data(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
              then: float) -> tuple[list[float], list[float]]:
-    """Return the amplitudes of a piece of a stage between two times, between which all tables are linear.
+    """Return step data between two times, between which all tables are linear.
 
-    The control is proportional to the time since the start of the piece. At its end the control is the largest change
-    of an amplitude, or 1 if no amplitude changes.
+    The control is 0 at the first time and proportional to the time since. At the second time the control equals the
+    largest change of an amplitude, or 1 if no amplitude changes. An amplitude is base + rate lambda.
 
     Args:
-        amplitudes: present amplitudes of all items, then the process time.
-        scales: for each item, its value in the user's units over its amplitude.
-        tables: [(number of the item, knots (time, value), shape (n, 2))].
-        now: process time at the start.
-        then: process time at the end.
+        amplitudes: present amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
+        scales: value of each in the user's units at amplitude 1, in the same order.
+        tables: [(index in `Scene.items`, knots (time, value) in the user's units, shape (n, 2))].
+        now: first process time.
+        then: second process time.
 
     Returns:
-        (`StepData.base`, `StepData.rate`).
+        Base and rate of each amplitude, then of the process time (`StepData`).
     """
     base, change = list(amplitudes), [0.0] * len(amplitudes)
     for i, table in tables:
@@ -77,7 +79,7 @@ def end_time(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float
 
     Args:
         stage: the stage.
-        tables: [(number of the item, knots (time, value), shape (n, 2))].
+        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))].
         now: process time at the start of the stage.
 
     Returns:
@@ -91,7 +93,7 @@ def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
     """Return the process time of the next knot in any of several tables.
 
     Args:
-        tables: [(number of the item, knots (time, value), shape (n, 2))].
+        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))].
         now: present process time.
         end: process time at the end of the stage.
 

@@ -42,8 +42,8 @@ _Targets: TypeAlias = list[tuple[Target, Quantity]]
 class Execution:
     """One run of a process, stage by stage, from its last state to the end of the last stage.
 
-    A stage consists of pieces, each with its own `StepData`. Piece 0 changes the active items. In each later piece a
-    control varies.
+    A stage consists of pieces, each a run with its own `StepData`. Piece 0 changes the active loads, supports and
+    contacts. Piece 1 varies the control of the stage. With tables, each of pieces 1, 2, ... ends at the next knot.
 
     Args:
         record: record of the states.
@@ -73,7 +73,8 @@ class Execution:
         """Run the remaining stages of the process.
 
         Args:
-            max_steps: largest number of steps of a piece; None: no limit.
+            max_steps: largest number of steps between two changes of the step data (a piece of a stage); None: no
+                limit.
             progress: True to show a progress bar.
 
         Raises:
@@ -124,8 +125,10 @@ class Execution:
         return found
 
     def _left_to_meet(self) -> _Targets:
-        """Return pairs (target, output quantity) of the present stage, without targets met on meshes before a
-        remeshing.
+        """Return the pairs (target, output quantity) of the present stage that are still to be met.
+
+        A remeshing within a stage starts a new run. Intermediate targets that this stage met on an earlier mesh are
+        left out.
         """
         met = [s.met[:2] for segment in self.record.segments[:-1] for s in segment.states
                if s.met and s.setting["stage"] == self._k]
@@ -146,19 +149,21 @@ class Execution:
         return setting.amplitude(number, control) * self.problem.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
-        """Set new step data in the problem for a piece of the present stage.
+        """Set new step data in the problem for a piece of the present stage, a run with its own step data.
 
-        base, rate: amplitudes as functions of the control, see `StepData`. piece: number of the piece. control: value
-        of the control at the present state. fading: True if unbalanced forces decrease to 0 at the control 1.
+        base, rate: an amplitude is base + rate times the control, for all `Scene.items`, then the process time. piece:
+        number of the piece. control: its value at the present state. fading: True if the forces that a change of the
+        active items leaves out of balance decrease to 0 as the control goes to 1.
         """
         changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
         setting = StepData(base, rate, self._inactive, fading, self._k, piece, changed, self.problem.setting.mesh)
         self.problem.enter(setting, self._present()[1], control)
 
     def _resumed(self, control: float) -> State:
-        """Return the present state of the process as the first state of a piece.
+        """Return the present state of the process as the first state of a run with new step data.
 
-        control: value of the control at this state under the new step data.
+        The unknowns are the same, but the control and the tangent of the path depend on the step data. control: value
+        of the control at this state under the new step data.
 
         Raises:
             ConvergenceError: the tangent is singular, or no first equilibrium was found.
@@ -179,7 +184,8 @@ class Execution:
         """Follow the path until the last target is met, and return the targets that are still open.
 
         targets, result: pairs (target, output quantity). control: value of the control at the present state, where the
-        piece starts; None: continue a piece. requested: another target that ends the piece, or None.
+        run starts; None: continue an interrupted run. requested: another target that ends the run if it is met before
+        the last one, or None.
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
@@ -191,9 +197,9 @@ class Execution:
         return run.targets.open
 
     def _change_items(self, begun: bool) -> None:
-        """Run piece 0 of the present stage: change the active items, and let the unbalanced forces decrease to 0.
+        """Change the active loads, supports and contacts of the present stage, and let unbalanced forces fade to 0.
 
-        begun: True to continue the piece.
+        This is piece 0 of the stage. begun: True to continue it.
 
         Raises:
             InputError: an item cannot become active.
@@ -223,9 +229,9 @@ class Execution:
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
 
     def _run_control(self, numbers: list[int], begun: bool) -> None:
-        """Run piece 1 of a stage in which the amplitude of one item is the control.
+        """Run a stage in which the amplitude of one load, support or contact is the control.
 
-        numbers: numbers of the controlled item, then of the items that move with it. begun: True to continue the piece.
+        numbers: its index in `Scene.items`, then those of the items that move with it. begun: True to continue the run.
         """
         control = None if begun else self._enter_control(numbers)
         self._trace(self._left_to_meet(), control)
@@ -233,8 +239,8 @@ class Execution:
     def _enter_control(self, numbers: list[int], clocked: bool = True) -> float:
         """Set step data in which the amplitude of a load, support or contact is the control; return its present value.
 
-        numbers: numbers of the controlled item, then of the items that move with it. clocked: True if process time may
-        pass while the control changes.
+        numbers: its index in `Scene.items`, then those of the items that move with it. clocked: True if process time
+        may pass while the control changes.
         """
         base, rate, control = control_step_data(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
@@ -251,9 +257,10 @@ class Execution:
         return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
     def _prescribe(self, numbers: list[int], begun: bool) -> None:
-        """Run piece 1 of a stage in which one item is adjusted so that another quantity follows an amplitude in time.
+        """Run a stage in which one load or tool is adjusted so that another quantity follows an amplitude in time.
 
-        numbers: numbers of the adjusted item, then of the items that move with it. begun: True to continue the piece.
+        numbers: its index in `Scene.items`, then those of the loads, supports and contacts with the same amplitude.
+        begun: True to continue the run.
         """
         control = None if begun else self._enter_control(numbers, clocked=False)
         target, amplitude, times = self._prescribed_amplitude(self.problem.setting.base[-1])
@@ -288,10 +295,10 @@ class Execution:
         return make_target(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
     def _run_tables(self, tables: list[tuple[int, Array]], piece: int) -> None:
-        """Run pieces 1, 2, ... of a stage with tables, each from knot to knot, with process time as the control.
+        """Run a stage with tables, with process time as the control; each piece 1, 2, ... goes to the next knot.
 
-        tables: [(number of the item, knots (time, value), shape (n, 2))]. piece: number of the piece to continue; 0 to
-        begin.
+        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))]. piece: number of the piece to continue; 0
+        to begin.
         """
         before, _, control = self._present()
         stage, through = self._stage, self._left_to_meet()
@@ -309,7 +316,10 @@ class Execution:
             now, begun = then, False
 
     def _enter_line(self, tables: list[tuple[int, Array]], now: float, then: float, piece: int) -> None:
-        """Set the step data of a piece between the times `now` and `then`, in which all tables are linear."""
+        """Set the step data between two process times, `now` and `then`, between which all tables are linear.
+
+        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))]. piece: number of the piece.
+        """
         base, rate = table_step_data(self._amplitudes(), self.problem.scales, tables, now, then)
         self._enter(base, rate, piece, 0.0)
 
@@ -342,8 +352,8 @@ class Execution:
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
         """Check that tables fit the present process time and the present values of their items.
 
-        tables: [(number of the item, knots (time, value), shape (n, 2))]. now: process time. end: process time at the
-        end of the stage.
+        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))]. now: process time. end: process time at
+        the end of the stage.
 
         Raises:
             InputError: a table begins in the past or with another value, or the stage ends in the past.

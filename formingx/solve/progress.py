@@ -65,7 +65,7 @@ class RunTargets:
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
     def add_known(self, state: State) -> None:
-        """Append the value of the last target's quantity in an earlier state of a run that is continued.
+        """Append the value of the last target's quantity to `values`, in a state that an interrupted run had reached.
 
         Args:
             state: the state.
@@ -74,10 +74,10 @@ class RunTargets:
         self._best = max(self._best, self.gained())
 
     def accept(self, state: State) -> None:
-        """Append the value of the last target's quantity in an accepted state, and close the targets that it meets.
+        """Append the value of the last target's quantity to `values`, and take the targets that are met out of `open`.
 
         Args:
-            state: the state.
+            state: the accepted state.
         """
         self.values.append(self._curve.value(self.quantity, state.x, state.control))
         self.open = [(t, b) for t, b in self.open if t is not state.met     # other targets may be met, too
@@ -89,7 +89,7 @@ class RunTargets:
                      if is_met(target, quantity.size, self._curve.value(quantity, state.x, state.control))), None)
 
     def close_met(self, start: State) -> None:
-        """Close the targets that the first state of the run, `start`, meets already."""
+        """Take the targets that the first state of the run, `start`, meets already, out of `open`."""
         while (target := self.met_by(start)) is not None:
             start.met = start.met or target
             self.open = [(t, b) for t, b in self.open if t is not target]

@@ -134,8 +134,8 @@ class Record:
     def restore(self) -> int:
         """Restore the step data and history variables of the last accepted state in the problem.
 
-        The first state with the same step data is restored before it, since the values of constrained unknowns and the
-        fading forces are taken from this state.
+        The values of constrained unknowns and the fading forces follow from the first state with the same step data.
+        This first state is therefore restored before the last one.
 
         Returns:
             Number of states at the end of the record with the same step data as the last one.

@@ -24,7 +24,7 @@ from petsc4py import PETSc
 from ..contact.step_limit import StepLimit, TrialStep
 from ..ranks import combined
 from .arc_length import Curve
-from .equations import Array, Equations, Viscosity
+from .equations import Array, Viscosity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
 
@@ -44,15 +44,15 @@ class SnapThrough:
 
     Attributes:
         lengths: arc lengths, decreasing. A step that fails twice below one of them is replaced by a snap-through, once
-            for each length. The last one is also the length of the predictor where a kink reverses the path, or where
-            no shorter step is left.
+            for each length. A snap-through starts at the last length along the tangent if a kink of F reverses the
+            path, or if no shorter step is left.
         ahead: change of the control in a snap-through, at first.
         furthest: largest change of the control in a snap-through.
         eta: first value of eta.
         least: value of eta below which the snap-through has failed.
         most: largest eta before the body has begun to move.
         most_moving: largest eta after the body has begun to move.
-        falls: smallest factor of eta after a viscous solution with at most `few` Newton iterations.
+        falls: smallest factor by which eta decreases, after a viscous solution with at most `few` Newton iterations.
         few: largest number of Newton iterations of a viscous solution after which eta decreases.
         grows: factor of eta after a failed viscous solution, before the body has begun to move.
         grows_moving: factor of eta after a failed viscous solution, after the body has begun to move.
@@ -61,8 +61,8 @@ class SnapThrough:
         nearest: smallest distance that the body should move in a viscous solution.
         farthest: largest distance that the body should move in a viscous solution.
         share: distance that the body should move in a viscous solution, over the distance moved so far.
-        again: distance moved in the first viscous solution, over the distance that the body should move, above which
-            this solution is repeated with more viscosity.
+        again: limit of the distance moved in the first viscous solution, over the distance that the body should move.
+            Above this limit the solution is repeated with more viscosity.
         solutions: number of viscous solutions after which the snap-through has failed. Where a sheet is drawn over an
             edge point by point, hundreds of solutions are needed.
         too_far: distance moved after which the snap-through has failed.
@@ -98,13 +98,14 @@ class SnapThrough:
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
         """Return the step lengths below which the second failure of a step triggers a snap-through.
 
-        If all contacts with friction stick, only the last length is returned, since shorter steps succeed.
+        These are all `lengths`. If all contacts with friction stick, it is the last one alone, since a shorter step
+        then succeeds and no snap-through is needed before.
 
         Args:
             limit: limits of a step by contact, or None.
 
         Returns:
-            Arc lengths, dimensionless, in decreasing order. One snap-through is tried below each.
+            Arc lengths, dimensionless, in decreasing order. A step tries one snap-through below each of them.
         """
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
@@ -147,7 +148,10 @@ class ViscousDrag:
         return self._viscosity.forces(x - self.origin, self.eta)
 
     def add_to(self, tangent: PETSc.Mat) -> None:
-        """Add eta V, the derivative of the viscous forces with respect to x, to a tangent matrix in place."""
+        """Add the derivative eta V of the viscous forces with respect to x to a tangent matrix in place.
+
+        eta: viscosity. V: matrix of a viscous stress with viscosity 1.
+        """
         self._viscosity.add_to(tangent, self.eta)
 
     def destroy(self) -> None:
@@ -162,7 +166,7 @@ class _Motion:
         curve: solver of the path.
         old: the state from which the body moves.
         control: control during the motion, which is constant.
-        settings: criteria and settings.
+        settings: settings of the motion (`SnapThrough`).
         work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either.
         passed: earlier states of the path, to which the body must not return.
 
@@ -189,13 +193,17 @@ class _Motion:
         self._wait = False                                  # eta may not fall after the next solution
 
     def continues(self, eta: float) -> bool:
-        """Return True if eta and the distance moved so far are within the bounds of the settings."""
+        """Return True if the viscosity eta, over the shear modulus, and the distance moved so far are within bounds."""
         settings = self._settings
         most = settings.most_moving if self.solved else settings.most
         return settings.least < eta < most and self.curve.moved(self._old, self.state) < settings.too_far
 
     def move(self, origin: Array, eta: float) -> float:
         """Solve F(x) + eta V (x - origin) = 0, and take the solution as the new position unless it is rejected.
+
+        V is the matrix of a viscous stress with viscosity 1. A solution is rejected if Newton's method fails, an
+        element is inverted, a point passes through a tool or the body moves back. The first solution is also rejected
+        if the body moves too far.
 
         Args:
             origin: unknowns from which the body moves, locally owned entries, shape (n,).
@@ -235,9 +243,9 @@ class _Motion:
         return max(1.0 if stays else settings.falls, far)
 
     def _reject(self, grows: float = 0.0) -> float:
-        """Reject a solution, and return the factor by which eta grows; eta may not decrease after the next solution.
+        """Reject a solution, and return the factor by which the viscosity eta grows.
 
-        grows: the factor; 0: the factor of the settings.
+        After the next solution eta stays constant or grows. grows: the factor; 0: the factor of the settings.
         """
         self._wait = True
         return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
@@ -246,11 +254,12 @@ class _Motion:
         """Return the equilibrium state near the present position, solved for without viscous forces.
 
         Returns:
-            The state, of kind "jump"; None if none is near, or if it is a state to which the body must not return.
+            The state, of kind "jump". None if none is near, or if the body moved back to it: against the sign of the
+            work, or to an earlier state of the path.
 
         Raises:
-            Failure: the iteration fails where the viscous forces vanish, and the body has no history variables. (With
-                history variables, the present position counts as the equilibrium state.)
+            Failure: the iteration fails although the viscous forces have vanished, in a body without history variables.
+                With history variables, the present position then counts as the equilibrium state.
         """
         try:
             with self.curve.newton.in_a_hurry(True):        # after a failure, the viscous motion continues
@@ -311,11 +320,12 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
         old: the state from which the body snaps.
         change: change of the control, dimensionless; its sign is the direction of the process.
         ahead: True to start at the point on the tangent of `old` with the changed control, False to start at `old`.
-        settings: criteria and settings.
-        solutions: largest number of viscous solutions; default `settings.solutions`.
+        settings: settings of snap-through.
+        solutions: largest number of solutions with viscous forces, after which the snap-through fails; None:
+            `settings.solutions`.
         listener: function that is called before each viscous solution.
-        work_sign: 1 or -1, the sign that the work of the controlled load must have, as where a volume has its maximum;
-            0: either.
+        work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either. At a maximum of the
+            enclosed volume, for example, a growing pressure must find a state with a larger volume.
         passed: earlier states of the path, to which the body must not return.
 
     Returns:
@@ -349,49 +359,6 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
         raise
     finally:
         motion.destroy()
-
-
-def at_limit_points(problem: Equations, falls: bool) -> str:
-    """Return the default rule at limit points of the control.
-
-    * "continue": follow the path through limit points. For problems without history variables, except for a pressure on
-      a body in contact.
-    * "continue_volume": follow the path while the enclosed volume grows, and snap where this volume has a maximum. For
-      an increasing pressure on a body with history variables or in contact.
-    * "snap_through": snap to the next equilibrium. For the other problems, and for time as the control: beyond a limit
-      point the control would reverse.
-
-    Args:
-        problem: the equations.
-        falls: True if the controlled quantity decreases towards 0, such as a pressure that is released.
-
-    Returns:
-        Name of the rule.
-    """
-    if problem.control_kind == "time":
-        return "snap_through"
-    by_pressure = problem.control_kind == "pressure"
-    if not (problem.has_history or problem.has_kinks and by_pressure):
-        return "continue"
-    return "continue_volume" if by_pressure and not falls else "snap_through"
-
-
-def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
-    """Return True if the body snaps at a state, where the control (or the enclosed volume) begins to reverse.
-
-    Args:
-        curve: solver of the path.
-        old: the state.
-        at_limit_point: the rule at limit points, as `at_limit_points` returns.
-        sense: 1 or -1, direction of the control at the start of the run.
-
-    Returns:
-        True if a snap-through should start here.
-    """
-    if at_limit_point not in ("snap_through",
-                              "continue_volume") or old.kind != "limit point" and old.slope * sense >= 0:
-        return False
-    return at_limit_point == "snap_through" or curve.work_ahead(old) * sense < 0
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:

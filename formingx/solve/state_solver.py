@@ -195,9 +195,9 @@ class StateSolver:
     def look_ahead(self, state: State) -> None:
         """Compute the path tangent of an accepted state for the next step, with updated history variables.
 
-        The factors of the last iteration are used again if the tangent differs at a few contact points only. Material
-        histories change the whole tangent. Predicted contact events need new factors, so that a run from a checkpoint
-        finds the same events.
+        The factors of the last iteration are used again if the tangent differs at a few contact points only. There are
+        two exceptions. History variables of a material change the whole tangent. Contact events are predicted with new
+        factors, since a run from a checkpoint has no others, and its events must be the same.
 
         Args:
             state: the accepted state; its tangent is changed in place.
@@ -246,8 +246,8 @@ class StateSolver:
     def target_residual(self, quantity: Quantity, target: float, state: State) -> tuple[float, float]:
         """Return the residual c of the constraint "quantity = target" at a state, and dc/ds along the tangent.
 
-        The target is extrapolated by this derivative. Values of the quantity on the tangent would be far off for a
-        stiff quantity, such as a contact force.
+        From both follows the arc length to the target, -c / (dc/ds), by linear extrapolation. Differences of the
+        quantity at points on the tangent would be far from dc/ds for a contact force, which is stiff.
 
         Args:
             quantity: the output quantity.
@@ -277,11 +277,14 @@ class StateSolver:
 
         .. math:: -\frac{\partial F}{\partial \lambda} \cdot \frac{dx}{ds}
 
+        F is the residual, lambda the control and s the arc length, all dimensionless.
+
         Args:
             state: the state.
 
         Returns:
-            Work, dimensionless; for a pressure the derivative of the enclosed volume with respect to arc length.
+            Work, dimensionless. For a pressure it is in proportion to the derivative of the enclosed volume with
+            respect to arc length.
         """
         self._x.array_w[:] = state.x
         self._b.array_w[:] = state.direction
@@ -291,12 +294,14 @@ class StateSolver:
     def work(self, a: State, b: State) -> float:
         """Return the work of the controlled load between two states, per unit of control, by the trapezoidal rule.
 
+        The integrand is -(dF/dcontrol) . dx, as in `work_ahead`.
+
         Args:
             a: first state.
             b: second state.
 
         Returns:
-            Work, dimensionless, see `work_ahead`.
+            Work, dimensionless.
         """
         done = 0.0
         for state in (a, b):

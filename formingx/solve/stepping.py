@@ -111,9 +111,9 @@ class TimeError:
     Args:
         problem: the equations.
         accuracy: allowed relative error of stress and thickness in the run.
-        once: tolerance of the error at the end of a step, over `accuracy`.
-        adding_up: tolerance of the part of the error that persists in later steps, and so adds up, over `accuracy` to
-            the power 3/2.
+        once: tolerance of the error at the end of a step, as a multiple of `accuracy`.
+        adding_up: tolerance of the part of the error that persists, as a multiple of `accuracy` to the power 3/2. It
+            decreases faster with `accuracy`, since this part adds up over more steps.
     """
 
     def __init__(self, problem: Equations, accuracy: float, once: float = 0.5, adding_up: float = 0.5):
@@ -150,8 +150,8 @@ class Cutback(Exception):
         why: the reason, as text.
         part: admissible length of the step, over its length.
         lasts: True if later steps must be shorter, too.
-        control: control at which the repeated step ends; None: it ends at its length. The control is given where time
-            is not proportional to arc length, since the body moves at once when a step begins.
+        control: control at which the repeated step ends; None: it ends at its arc length. A step in time needs the
+            control if the body moves at once when the step begins: the arc length then says little about the time.
     """
 
     def __init__(self, why: str, part: float, lasts: bool = False, control: float | None = None):
