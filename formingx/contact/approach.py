@@ -21,28 +21,32 @@ from .gap_closures import gap_closures
 class StepLimits:
     """Limits that contact sets to a step.
 
+    Contact with tools in three dimensions is lagged: the closed points, and the pressure that bounds their friction,
+    are those of the last accepted state.
+
     Attributes:
         closed_at_start: fraction of a step; gaps that close earlier in the step count as closed at its start.
         overshoot: length of a step that ends at a gap closure, over the arc length to the closure.
         negligible_gap: distance from the outer edge of the ramp, over the thickness of the sheet, that is negligible.
-        frictionless_from: fraction of a step; sticking points whose gap closes later carry no friction before the next
-            step.
+        frictionless_from: fraction of a step. If the gap of a sticking point closes in the rest of the step, friction
+            acts on the point from the next step on only.
         largest_slip: largest slip of a sticking point after its gap closure in a step, over its tributary length.
         largest_approach: largest motion of a point in a step of lagged contact, less its tributary length, over its
             gap.
         largest_cut: largest depth of the straight path of a point inside a tool, over its tributary length.
         most_positions: largest number of positions at which this path is checked.
         pressure_change: largest predicted change of the pressure in a step of lagged friction, over the pressure.
-        pressure_difference: allowed difference between the pressure at the end of the step and the pressure that limits
+        pressure_difference: allowed difference between the pressure at the end of the step and the pressure that bounds
             friction, over the pressure.
         corrections: largest number of repeated solutions of a step that reduce this difference.
         difference_at_target: allowed difference between the contact pressure of a state at a target and the pressure
             with which it was solved, over the pressure.
-        rejected_change: change of the pressure in a step, over `pressure_change`, from which on the step is rejected.
+        rejected_change: multiple of `pressure_change`; a solved step with a larger change of the pressure is rejected.
         settling: number of Newton iterations that lagged friction needs in a step, however short the step is.
         least_force: normal force, over shear modulus times thickness times length, that is added to the denominator of
-            these relative changes: lightly loaded contacts do not limit the step.
-        shortest: arc length (dimensionless) below which steps are never too long for these changes.
+            relative changes of the pressure: lightly loaded contacts do not limit the step.
+        shortest: arc length (dimensionless) below which a step is rejected neither for a change of the pressure nor for
+            the slip of a point after its gap closure.
         shortest_mixed: arc length (dimensionless) below which sticking points may lift off while the gaps of others
             close.
     """
@@ -110,7 +114,7 @@ class Approach:
         The step ends where `max_closures` new points have come into contact. If at most one point was in contact
         before, it ends at the first gap closure. If a whole region came into contact in one step, its sticking
         positions would depend on the step length. In lagged contact the motion of the points and the change of the
-        friction pressure are limited too.
+        pressure are limited too.
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).
@@ -167,8 +171,8 @@ class Approach:
             times: arc lengths at which gaps close, shape (n,); `length` for gaps that stay open.
             places: positions of the points at these arc lengths, relative to the tool, shape (n, c), length.
             length: arc length of the step (dimensionless).
-            ends: True if the run will end the step where the gap of a point closes that then slips wrongly, see
-                `fraction_to_wrong_slip`. A sticking point whose gap closes near the end of the step then carries no
+            ends: True if `StepLimit.check` will shorten the step to a gap closure whose point slips too far, or against
+                its friction, afterwards. A sticking point whose gap closes near the end of the step then carries no
                 friction before the next step, unless its predicted slip is too large.
             guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
             speeds: derivatives of the positions by arc length just before the predicted closures, shape (n, c), length;
@@ -189,9 +193,9 @@ class Approach:
     def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """Return True if too many points came into contact in a step.
 
-        The limit is about twice `max_closures`, or twice the predicted number of gap closures. In lagged contact the
-        limit concerns the depth: a new point must not be deeper in the tool than twice its tributary length. Contacts
-        without history variables have no limit.
+        The limit is 2 plus twice the larger of `max_closures` and the predicted number of gap closures. In lagged
+        contact the limit concerns the depth: a new point must not be deeper in the tool than twice its tributary
+        length. Contacts without history variables have no limit.
 
         Args:
             old: locally owned unknowns at the start of the step, shape (n,).
@@ -214,7 +218,7 @@ class Approach:
 
     @property
     def has_lagged_friction(self) -> bool:
-        """True if friction is lagged: the pressure of the last accepted state limits the friction in the step."""
+        """True if friction is lagged: the pressure of the last accepted state bounds the friction in the step."""
         return bool(self.face.contact.lagged and 0 < self.face.law.mu < np.inf)
 
     def change_of_pressure(self, new: np.ndarray, control: float) -> float:
@@ -230,7 +234,7 @@ class Approach:
         return self._pressure_difference(self.face.tractions(new, control).normal) if self.has_lagged_friction else 0.0
 
     def update_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Update the pressure that limits lagged friction to the pressure at the end of the step.
+        """Replace the pressure that bounds lagged friction by the pressure at the end of the step.
 
         Args:
             new: locally owned unknowns at the end of the step, shape (n,).
@@ -250,12 +254,13 @@ class Approach:
         return True
 
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Replace the contact pressure of the last accepted state by the contact pressure of a state at a target.
+        """Replace the stored contact pressure, of the last accepted state, by the pressure of a state at a target.
 
-        This pressure limits lagged friction, and fades the tangential part of a pressure on a sheet that slides.
+        The stored pressure bounds lagged friction. Where a sheet slides, the tangential part of a fluid pressure also
+        decreases with the stored contact pressure.
 
         Args:
-            new: locally owned unknowns of the state, shape (n,).
+            new: locally owned unknowns of the state, which meets a target of the run, shape (n,).
             control: load parameter (control) of the state, dimensionless.
 
         Returns:
@@ -278,7 +283,7 @@ class Approach:
     def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
         """Return the arc length of a step in which the contact pressure changes by `StepLimits.pressure_change`.
 
-        The pressure that limits lagged friction is extrapolated linearly.
+        The pressure that bounds lagged friction is extrapolated linearly.
 
         Args:
             start: positions of the points relative to the tool, shape (n, c), length.
@@ -378,12 +383,12 @@ class Approach:
 
     def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
                                length: float) -> float:
-        """Return the fraction of a step after which the first point closed its gap and then slipped wrongly.
+        """Return the fraction of a step at which the first gap closes whose point then slips in a wrong way.
 
-        Pressure and slip since the gap closure are assumed to grow at their rates at the end of the step, along
-        (direction, slope). A sticking point without a predicted gap closure carries no friction in the step. It slips
-        wrongly if it moved farther along the tool than `StepLimits.largest_slip` allows. A point with Coulomb friction
-        slips wrongly if its final sliding opposes the accumulated slip.
+        There are two wrong ways. A sticking point without a predicted gap closure carries no friction in the step, but
+        moved along the tool by more than `StepLimits.largest_slip`. A point with Coulomb friction slides at the end
+        against the slip since its gap closure. Pressure and slip are assumed to grow from the gap closure on, at their
+        rates at the end of the step, along (direction, slope).
 
         Args:
             new: locally owned unknowns at the end of the step, shape (n,).
@@ -393,7 +398,7 @@ class Approach:
             length: arc length of the step.
 
         Returns:
-            Fraction of the step to the first such gap closure; 1 without such points.
+            Fraction of the arc length up to the first such gap closure; 1 without such points.
         """
         face, law, history = self.face, self.face.law, self.face.history
         if history is None or not law.has_friction:

@@ -64,7 +64,9 @@ double crossing(const double *x, const double *w, double theta, double shift, do
 
 
 def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
-    """Return the arc lengths at which open points on straight paths reach the outer edge of the ramp of their tool.
+    """Return the arc lengths at which open points on straight paths reach their tool: their gaps close.
+
+    Contact begins at the signed distance -theta (positive inside the tool), the outer edge of the contact ramp.
 
     Args:
         law: contact law.
@@ -98,7 +100,9 @@ def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.nda
 
 def crossing(law: Any, i: int, x: np.ndarray, velocity: np.ndarray, earliest: float, accuracy: float,
              iterations: int) -> float:
-    """Return the arc length at which a point near its tool is at the outer edge of the ramp, by Newton's method.
+    """Return the arc length at which the gap of a point near its tool closes, by Newton's method.
+
+    Contact begins at the signed distance -theta (positive inside the tool), the outer edge of the contact ramp.
 
     Args:
         law: contact law.
@@ -106,7 +110,7 @@ def crossing(law: Any, i: int, x: np.ndarray, velocity: np.ndarray, earliest: fl
         x: position of the point relative to the tool at arc length 0, shape (2,), length.
         velocity: its derivative by arc length, shape (2,), length.
         earliest: lower bound of the result, an arc length.
-        accuracy: largest distance from the outer edge of the ramp, over theta, at the result.
+        accuracy: largest error of the distance -theta at the result, over theta.
         iterations: largest number of iterations.
 
     Returns:

@@ -13,10 +13,13 @@ class Increment:
     """Tractions at n contact points during one increment, starting from the last accepted state.
 
     An increment begins with each run of Newton's method, and with each evaluation of a state. It ends when the state is
-    accepted. In each iteration the contact calls `tractions(x)` for the residual, with x the positions of the points
-    relative to the tool, shape (n, c). It then calls `linearise(x)` at the same positions. From then on `tractions(x)`
-    contains the tangent of the iteration. The local solve of contact (`LocalSolve`) then reads `status`,
-    `newly_closed`, `taken` and `predicted`, and calls `expect` to set the sense of sliding for the next iteration.
+    accepted. x are the positions of the points relative to the tool, with c components. In each iteration these methods
+    are called:
+
+    * `tractions(x)`, for the residual.
+    * `linearise(x)` at the same positions. After it, `tractions(x)` returns the linearised law with its stiffness.
+    * If statuses change, the local contact problem (`LocalSolve`) reads `status`, `newly_closed` and `last_tractions`,
+      predicts tractions by `law_at` and `predicted`, and sets the sense of sliding of the next iteration by `expect`.
 
     Args:
         law: contact law.
@@ -54,13 +57,17 @@ class Increment:
         return self._last[1]
 
     def linearise(self, x: np.ndarray) -> np.ndarray:
-        """Linearise the law at the distances and slips that the last iteration predicted to first order.
+        """Linearise the contact law for this iteration.
+
+        The law is linearised at predicted distances and slips. They are extrapolated from the last iteration to x by
+        their first derivatives with respect to the position.
 
         Args:
             x: positions of the points relative to the tool in this iteration, shape (n, c), length.
 
         Returns:
-            Tractions of the linearised law minus tractions of the law itself, at x, shape (n, c), stress.
+            Tractions of the linearised law minus tractions of the law itself, both at x, with c components, shape (n,
+            c), stress.
         """
         plain = found = self.tractions(x)
         now = self._law.motion(x, self._history)
@@ -138,9 +145,9 @@ class Increment:
 
         Returns:
             Function of the motion of these points since the last computed tractions, shape (m, c), length. It returns
-            the depth over the width 2 theta of the ramp, shape (m,): 0 at the outer edge, 1 at the inner edge. Its
-            second value is the vector through the ramp along the normal, shape (m, c), length; 0 for points that slide,
-            adhere or have no friction.
+            two arrays. The first is the depth over the width 2 theta of the ramp, shape (m,): 0 at the signed distance
+            -theta, where contact begins, and 1 at the distance theta. The second is the normal times 2 theta, shape (m,
+            c), length; 0 for points that slide, adhere or have no friction.
         """
         assert self._before is not None
         width, x = 2 * self._law.theta, self._now[0][points]
@@ -153,7 +160,11 @@ class Increment:
         return depth_and_path
 
     def _predicted_motion(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
-        """Return a function that maps motions of some points, shape (m, c), length, to their first-order `Motion`."""
+        """Return a function that maps the motions of m points since the last tractions, to first order, to a `Motion`.
+
+        points: indices of the points, shape (m,), or a slice. The motions have the shape (m, c), length. A `Motion` has
+        the distances and slips that the contact law needs.
+        """
         assert self._before is not None
         before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]
         return lambda motion: before.to(x + motion)

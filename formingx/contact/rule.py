@@ -102,7 +102,11 @@ class Rule(Protocol):
 
 
 class _Nodes:
-    """Base of rules whose contact points are nodes of the face, so that a point moves with the unknowns of its node."""
+    """Base of rules whose contact points are nodes of the face, so that a point moves with the unknowns of its node.
+
+    Attributes:
+        dofs: local numbers of the displacement unknowns of each point, shape (n, components).
+    """
 
     dofs: np.ndarray
 
@@ -207,8 +211,9 @@ class Lobatto(_Nodes):
     def _spread_to_axis(self, kinematics: Any, comm: Any) -> None:
         """Give the node on the axis a share of the area of its facet, so that contact forces act on the node.
 
-        The three nodes of the facet get (1/24, -2/24, 1/24) of its length L times the weight at L. Integrals of linear
-        functions along the facet stay exact.
+        The facet extends from the axis along a length L. Its three nodes get the additional areas (1/24, -2/24, 1/24) L
+        w, with the weight w = 2 pi R (area per length) at the radius R = L. Integrals of linear functions along the
+        facet stay exact.
         """
         nodes = gathered(comm, np.column_stack([self.points, self.lengths, self.lumped]))
         for axis in nodes[without_area(nodes[:, -1], nodes[:, -2])]:
@@ -334,7 +339,10 @@ class Gauss:
         return grown * weight(now.T) / weight(self.points.T)
 
     def _at_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the nodes of each point, shape (n, 3, components), from locally owned unknowns."""
+        """Return the displacement of the three nodes on the facet of each point, shape (n, 3, components).
+
+        values: locally owned unknowns.
+        """
         unknowns, n = self._unknowns, self._owned
         unknowns.array[:n] = values[:n]
         unknowns.scatter_forward()
@@ -374,7 +382,11 @@ def _displacements(solid: Any) -> tuple[Any, np.ndarray]:
 
 
 def _nodes_of(facets: np.ndarray, vectors: Any, X: np.ndarray) -> np.ndarray:
-    """Return the local numbers of the two end nodes and the middle node of each facet, shape (facets, 3)."""
+    """Return the local numbers of the two end nodes and the middle node of each facet, shape (facets, 3).
+
+    facets: local numbers, shape (facets,). vectors: space of the displacement. X: reference positions of all its nodes,
+    shape (nodes, components), length.
+    """
     found = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
              for f in facets]
     return np.array(found, dtype=np.int32).reshape(-1, 3)

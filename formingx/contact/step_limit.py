@@ -22,13 +22,13 @@ class EventPrediction(Protocol):
     """
 
     def step_length(self, length: float) -> float | None:
-        """Return the admissible arc length of the step.
+        """Return the arc length of the step, limited by the number of gaps that close in it.
 
         Args:
             length: largest arc length.
 
         Returns:
-            Arc length, at most `length`. None if the prediction failed; then the other methods also return None.
+            Arc length, at most `length`. None if the prediction failed; `closures` and `bend` then also return None.
         """
 
     def closures(self, length: float) -> list[tuple] | None:
@@ -158,8 +158,8 @@ class StepLimit:
         self._predictor = make(self) if make else None
 
     make_predictor: ClassVar[Callable[[StepLimit], EventPredictor] | None] = None
-    """Function that makes the predictor of a limit, set by an extension. Without it, a step ends where the gap of a
-    sticking point closes."""
+    """Function that makes the predictor of contact events of a `StepLimit`; an extension sets it. Without it, a step
+    ends where the gap of a sticking point closes."""
 
     @property
     def present(self) -> list[Approach]:
@@ -168,10 +168,10 @@ class StepLimit:
 
     @property
     def only_sticks(self) -> bool:
-        """True if there is active contact with friction, all of it sticks, and its tools are plane (`Tool`).
+        """True if there is active contact with friction, all of it sticks, and its tools are profiles in a plane.
 
-        No contact slides then, so that a path does not end by sliding. The run may reduce a step to the shortest
-        length.
+        No point slides then, so the path does not end where points begin to slide. The run may therefore reduce failed
+        steps further before it tries a snap-through (`SnapThrough.lengths_for`).
         """
         faces = [approach.face for approach in self.present if approach.face.law.has_friction]
         return bool(faces) and all(face.contact.sticks and not face.contact.lagged for face in faces)
@@ -200,8 +200,9 @@ class StepLimit:
     def length(self, trial: TrialStep) -> float:
         """Return the largest admissible arc length of a step along a tangent.
 
-        The step ends where the gaps of `Approach.max_closures` points have closed, or of more points if events are
-        predicted. If at most one point is in contact, it ends at the first gap closure.
+        The step ends where the gaps of a number of points have closed. This number is `Approach.max_closures`, often
+        one, or up to a twentieth of the points of a face if the order of the gap closures is predicted. If at most one
+        point is in contact, the step ends at the first gap closure.
 
         Args:
             trial: the trial step, with the wanted arc length.
@@ -221,7 +222,8 @@ class StepLimit:
 
         Args:
             trial: the trial step.
-            ends: True if the run will end the step at the first gap closure that it handles wrongly, see `check`.
+            ends: True if `check` will shorten the step to a gap closure whose point slips too far, or against its
+                friction, afterwards. Only then may a sticking point close near the end of the step without friction.
 
         Returns:
             Deviation of the predicted end of the step from the tangent, due to contact events: change of x, locally
@@ -243,8 +245,8 @@ class StepLimit:
             old: accepted state at the start of the step.
             new: converged state at its end.
             length: arc length of the step.
-            ends: True to also reject a step in which a point closes its gap and then slips wrongly. Such a point should
-                stick or slide from its gap closure on; a long step misses this position.
+            ends: True to also reject a step in which a point slips too far after its gap closure, or slides against the
+                slip since then. The repeated step ends at this gap closure, from which the point sticks or slides.
 
         Returns:
             Reason and admissible fraction of the step; None if the step is accepted.
@@ -288,8 +290,8 @@ class StepLimit:
     def close_penetrated(self, new: Any, at_target: bool, sweep: int) -> bool:
         """Close the contact of points that penetrated a tool in three dimensions during a step, at its converged state.
 
-        At a target this applies to all tools, otherwise only to tools with friction. Friction then acts at these
-        points, limited by the pressure of the state.
+        At a target this applies to all tools, otherwise only to tools with friction. The contact pressure of this state
+        then bounds the friction of all points, in place of the pressure of the last accepted state.
 
         Args:
             new: the converged state.
@@ -297,7 +299,8 @@ class StepLimit:
             sweep: number of earlier calls for this step.
 
         Returns:
-            True if a contact status or a friction pressure changed, so that the state must be solved for again.
+            True if a contact status, or the pressure that bounds friction, changed. The state must then be solved for
+            again.
         """
         n, again = self._n, sweep < LIMITS.corrections
         late = [c.face.close_penetrated(new.x[:n], new.control, LIMITS.negligible_gap * c.face.thickness)

@@ -49,8 +49,8 @@ class Tooling(NamedTuple):
     def names(self) -> list[str]:
         """Name of the tool of each contact, in the order of the contacts.
 
-        A tool without a name is called "tool 1", "tool 2", ..., by the number of its first contact. Tools with the same
-        direction of motion count as one tool.
+        A tool without a name is called "tool 1", "tool 2", ..., by the number of its contact. Unnamed tools with the
+        same direction of motion count as one tool: they all have the name of the first of them.
         """
         first: dict[Any, int] = {}
         alike = [k if c.direction is None else c.direction for k, c in enumerate(self.contacts)]
