@@ -28,7 +28,7 @@ def measure(elements, friction, case):
     """Return the thickness ratio by R at each pressure that was met, the path, seconds, and how it ended."""
     began = time.perf_counter()
     path, end = run(**{"elements": elements, **case}, friction=friction, pressures=PRESSURES)
-    met = {p: path.met(fx.pressure(p)) for p in PRESSURES}
+    met = {p: path.target_state(fx.pressure(p)) for p in PRESSURES}
     profiles = {p: path.profile(state) for p, state in met.items() if state is not None}
     return profiles, path, time.perf_counter() - began, end
 

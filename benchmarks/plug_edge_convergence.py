@@ -48,7 +48,7 @@ def press(fillet, friction, refinement, travels=TRAVELS):
 
 def peak(path, travel):
     """Return the peak at a travel, or None if it was not reached."""
-    state = path.met(fx.travel(travel))
+    state = path.target_state(fx.travel(travel))
     return None if state is None else path.stress(state).peak(radii=(0.0, 2 * PLUG))
 
 

@@ -58,7 +58,7 @@ def row(key, seconds) -> list:
     finally:
         signal.setitimer(signal.ITIMER_PROF, 0)
     radius = made.lengths[0]
-    met = [path and path.met(fx.travel(t * radius)) for t in AT]
+    met = [path and path.target_state(fx.travel(t * radius)) for t in AT]
     forces = [f"{plugs.force(state):.6g}" if state else "" for state in met]
     reached = [0, *forces, 0, 0, 0] if path is None else [
         f"{path['travel'].max() / radius:.4g}", *forces, len(path.jumps), path.counts.steps, path.counts.iterations]

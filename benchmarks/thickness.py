@@ -70,7 +70,7 @@ def inflate(ratio, c01=0.0, space="P1dg", stretches=STRETCHES, heights=None, **m
 def measures(path, ratio):
     """Return {quantity: values at the targets that were met}."""
     near_rim = [(1 - np.clip(1 / ratio, 0.05, 0.5), 1 / ratio)]
-    met = [s for s in path.states if s.met]
+    met = [s for s in path.states if s.target]
     return {"heights": [s.measures["pole_height"] for s in met],
             "pressure": [s.measures["pressure"] for s in met],
             "pole_thickness": [path.profile(s).thickness[0] for s in met],
@@ -134,7 +134,7 @@ def rim_faces():
         for name, mesh in (("standard", {"accuracy": "standard"}), ("60x33", {"elements": (60, 33)}),
                            ("reference", {"elements": RATIOS[ratio][0], "space": "P1"})):
             path, _ = inflate(ratio, MATERIALS[material], stretches=stretches, **mesh)
-            found = [least_along_rim(path.stress(s), 1 / ratio) for s in path.states if s.met]
+            found = [least_along_rim(path.stress(s), 1 / ratio) for s in path.states if s.target]
             say(f"{ratio:<6g}{material:12}{name:14}" + "".join(f"{least:8.3f}" for least in found))
             results[f"{ratio} {material}, {name}"] = found
     return results

@@ -29,7 +29,7 @@ def pressures(elements, support, model=None, grading=1.0, until=8.5, max_steps=2
     except fx.ConvergenceError as error:
         path, stopped = error.path, f"stopped at stretch {error.path.last.measures['pole_stretch']:.2f}"
     limit = path.limit_points[0].measures["pressure"] if path.limit_points else None
-    at = [(state := path.met(t)) and state.measures["pressure"] for t in targets]
+    at = [(state := path.target_state(t)) and state.measures["pressure"] for t in targets]
     return {"limit": limit, "at": at, "steps": path.counts.steps, "iterations": path.counts.iterations,
             "volume_error": path.last.measures["volume_error"], "seconds": path.counts.seconds, "stopped": stopped}
 

@@ -50,7 +50,7 @@ def creep(p, n, accuracy):
     stages = [fx.Stage("put on", control="air", until=fx.pressure(p * H0 / R0), intermediate=through),
               fx.Stage("creep", duration=LONG, intermediate=through, at_limit_point="stop")]
     path = fx.Process(balloon(n)).run(stages, accuracy=accuracy, max_steps=100_000)
-    met = {f"{s:g}": path.met(target) for s, target in zip(CREPT, through)}
+    met = {f"{s:g}": path.target_state(target) for s, target in zip(CREPT, through)}
     found: dict = {"time_at_stretch": {s: float(state.time) for s, state in met.items() if state is not None}}
     if path.limit_points:
         found |= {"snap_time_s": float(path.limit_points[-1].time),

@@ -51,17 +51,17 @@ def inflate(held, n):
         return fx.trace(scene(held, n), until=fx.pole_stretch(END), intermediate=[fx.pole_stretch(STRETCH)],
                         progress=False)
     except fx.ConvergenceError as error:
-        if error.path.met(fx.pole_stretch(STRETCH)) is None:
+        if error.path.target_state(fx.pole_stretch(STRETCH)) is None:
             raise
         return error.path
 
 
 def key_numbers(path):
     """Return the numbers of the summary of one path; the peak is taken in the outer part of the sheet."""
-    state, limit = path.met(fx.pole_stretch(STRETCH)), path.limit_points
+    state, limit = path.target_state(fx.pole_stretch(STRETCH)), path.limit_points
     peak = path.stress(state).peak(radii=(0.9 * RADIUS, 2 * RADIUS))
     return {"limit_pressure_kg_per_cm2": limit[0].measures["pressure"] if limit else None,
-            "arrived": path.met(fx.pole_stretch(END)) is not None,
+            "arrived": path.target_state(fx.pole_stretch(END)) is not None,
             "pressure_kg_per_cm2_at_stretch_1.5": state.measures["pressure"],
             "peak_stress_kg_per_cm2_at_stretch_1.5": peak.value, "peak_at_R_Z_cm": list(map(float, peak.point)),
             "peak_converged": peak.converged, "newton_iterations": path.counts.iterations}
@@ -98,7 +98,7 @@ def draw(numbers, paths, out):
 def draw_stress(axes, path, held):
     """Draw the deformed elements at the rim; return their colours by the largest principal stress."""
     fields = Fields(path)
-    found = fields.evaluate(path.met(fx.pole_stretch(STRETCH)))
+    found = fields.evaluate(path.target_state(fx.pole_stretch(STRETCH)))
     corners = (fields.points + found["displacement"])[:, :3]
     shades = PolyCollection(corners, array=found["principal_stresses"][:, :3, 0].mean(1), cmap="viridis",
                             edgecolors="white", linewidths=0.2, clim=(0, 12))

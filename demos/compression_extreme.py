@@ -40,7 +40,7 @@ def frictionless(elements):
     """Return the path, its force over the exact one at the ratios, and how it ended."""
     scene = block(fx.NeoHookean(c10=I1_CONSTANT), "none", elements, present_area=True)
     path, end = press(scene, [travel(r) for r in RATIOS], progress=False)
-    met = {r: path.met(fx.travel(travel(r))) for r in RATIOS}
+    met = {r: path.target_state(fx.travel(travel(r))) for r in RATIOS}
     over = {f"{r:g}": force(s) / exact_force(HALF_HEIGHT / r) for r, s in met.items() if s is not None}
     return path, over, end
 
@@ -52,7 +52,7 @@ def stuck(elements, size, ratios):
     path, end = press(scene, [travel(r) for r in ratios], progress=False,
                       remesh=fx.Remesh(size=size, corner=size, volume_ratio=(0.8, 1.2)),
                       record={"least_J": lambda problem: problem.admissible.volume_ratios()[0]})
-    met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in ratios}
+    met = {f"{r:g}": path.target_state(fx.travel(travel(r))) for r in ratios}
     least = [state.measures["least_J"] for state in path.states]
     made = [state for state in path.states if state.kind == "remesh"]
     return path, {

@@ -41,7 +41,7 @@ def compress(elements, friction="stick"):
     """Return the path, {ratio as text: state that met it}, and how the path ended."""
     scene = block(fx.MooneyRivlin(c10=1.0, c01=0.1), friction, elements, roll_over=True, nodes_per_step=1)
     path, end = press(scene, [travel(r) for r in RATIOS], max_steps=400)
-    met = {f"{r:g}": path.met(fx.travel(travel(r))) for r in RATIOS}
+    met = {f"{r:g}": path.target_state(fx.travel(travel(r))) for r in RATIOS}
     return path, {r: state for r, state in met.items() if state is not None}, end
 
 

@@ -38,7 +38,7 @@ def disc(columns):
 
 def minimum_walls(path, pressures) -> dict:
     """Return {pressure as text: minimum wall over h0, away from the rim}."""
-    shapes = {f"{p:g}": path.profile(path.met(fx.pressure(p))) for p in pressures}
+    shapes = {f"{p:g}": path.profile(path.target_state(fx.pressure(p))) for p in pressures}
     return {p: float(shape.wall_ratio[shape.reference_radius < INSIDE * RADIUS].min()) for p, shape in shapes.items()}
 
 

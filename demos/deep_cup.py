@@ -65,7 +65,7 @@ def main():
             f" {n['min_thickness_ratio_at_psi'][f'{PRESSURES[-1]:g}']:.4f};"
             f" {n['steps']} states, {n['newton_iterations']}"
             f" Newton iterations, {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s")
-        write(path, mould, [path.met(fx.pressure(p)) for p in PRESSURES], args.out, name)
+        write(path, mould, [path.target_state(fx.pressure(p)) for p in PRESSURES], args.out, name)
         if not args.quick and friction == "stick":
             path.view3d(args.out / "deep_cup_3d.png")
     summarise(args.out, {**summary, "mesh": {"radius_elements": elements[0], "thickness_elements": elements[1]},

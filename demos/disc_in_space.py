@@ -29,7 +29,7 @@ def inflate(size):
 def key_numbers(path, targets):
     """Return the numbers of the summary of one path."""
     limit = membrane_limit_point(radius=1.0, thickness=THICKNESS, c10=C10)[1].pressure
-    states = {f"{s:g}": (path.met(target), EXACT[s]) for s, target in zip(STRETCHES, targets)}
+    states = {f"{s:g}": (path.target_state(target), EXACT[s]) for s, target in zip(STRETCHES, targets)}
     return {
         "pressure_over_axisymmetric": {s: state.measures["pressure"] / exact.pressure
                                        for s, (state, exact) in states.items()},

@@ -39,7 +39,7 @@ def key_numbers(path, modulus):
     """Return {pole stretch: {name: number}} of a path."""
     found = {}
     for stretch in STRETCHES:
-        state = path.met(fx.pole_stretch(float(stretch)))
+        state = path.target_state(fx.pole_stretch(float(stretch)))
         profile = path.profile(state)
         found[stretch] = {
             "p_R0_over_C0_h0": state.measures["pressure"] / (modulus(0.0) * THICKNESS),

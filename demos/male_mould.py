@@ -44,7 +44,7 @@ def form(process, friction, elements):
 def key_numbers(path, targets):
     """Return the numbers of the summary of one path."""
     drape = targets[0].name == "travel"
-    unit, states = "cm" if drape else "psi", {f"{t.value:g}": path.met(t) for t in targets}
+    unit, states = "cm" if drape else "psi", {f"{t.value:g}": path.target_state(t) for t in targets}
     profiles = {at: path.profile(state) for at, state in states.items()}
     control = "travel" if drape else "pressure"
     last, thinnest = path.profile(), int(np.argmin(path.profile().thickness_ratio))
@@ -78,7 +78,7 @@ def main():
             say(f"  {at:>6}" + "".join(f"{n[f'{key}_at_{unit}'][at]:{width}}" for key, width in (
                 ("pole_thickness_ratio", "12.5f"), ("min_thickness_ratio", "12.5f"), ("contact_length_cm", "14.3f"),
                 ("tool_force_lb", "12.2f"))))
-        write(path, mould, [path.met(t) for t in targets], args.out, name, unit=unit, side="bottom")
+        write(path, mould, [path.target_state(t) for t in targets], args.out, name, unit=unit, side="bottom")
         if not args.quick:
             path.view3d(args.out / f"{name}_3d.png")
     summarise(args.out, {**summary, "mesh": {"radius_elements": elements[0], "thickness_elements": elements[1]},

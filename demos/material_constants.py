@@ -68,7 +68,7 @@ def relaxing_numbers(sheet, elements, elastic):
     blow = fx.Stage("blow", control=scene.loads[0], amplitudes={fx.pole_height: [(0.0, 0.0), (FORMING, end)]},
                     until=times[HEIGHTS[-1]], intermediate=list(times.values())[:-1])
     path = fx.Process(scene).run([blow])
-    pairs = {h: (path.met(times[h]).measures, elastic.met(fx.pole_height(float(h) * radius)).measures)
+    pairs = {h: (path.target_state(times[h]).measures, elastic.target_state(fx.pole_height(float(h) * radius)).measures)
              for h in HEIGHTS}
     return {"pressure_over_elastic_at_height": {h: a["pressure"] / b["pressure"] for h, (a, b) in pairs.items()},
             "pole_thickness_over_elastic_at_height": {
@@ -79,7 +79,7 @@ def relaxing_numbers(sheet, elements, elastic):
 def sheet_numbers(sheet, path):
     """Return the numbers of a case of table 4.2."""
     radius, _, c10, c01 = sheet
-    states = {h: path.met(fx.pole_height(float(h) * radius)).measures for h in HEIGHTS}
+    states = {h: path.target_state(fx.pole_height(float(h) * radius)).measures for h in HEIGHTS}
     numbers = {
         "pole_thickness_ratio_at_height": {h: m["pole_stretch"] ** -2 for h, m in states.items()},
         "pressure_over_K_at_height": {h: m["pressure"] / (6 * (c10 + c01)) for h, m in states.items()},
@@ -174,7 +174,7 @@ def draw(paths, out, quick):
     left.plot(height / radius, stretch**-2, color="tab:blue")
     left.set(xlabel="pole height/r$_0$", ylabel="pole thickness/original", xlim=(0, None), ylim=(0, 1.02))
     for h in HEIGHTS:
-        profile = path.profile(path.met(fx.pole_height(float(h) * radius)))
+        profile = path.profile(path.target_state(fx.pole_height(float(h) * radius)))
         right.plot(profile.reference_radius / radius, profile.thickness_ratio, label=f"pole height {h} r$_0$")
     right.set(xlabel="reference radius R/r$_0$", ylabel="thickness/original", ylim=(0, 1.02))
     right.legend(frameon=False)

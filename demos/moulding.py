@@ -55,7 +55,7 @@ def bisected(path, k: int, beyond) -> float:
 
 def at_pressures(path, pressures, unit: str) -> dict:
     """Return the thickness at given pressures, each of them met exactly."""
-    profiles = {f"{p:g}": path.profile(path.met(fx.pressure(p))) for p in pressures}
+    profiles = {f"{p:g}": path.profile(path.target_state(fx.pressure(p))) for p in pressures}
     thinnest = {p: int(np.argmin(profile.thickness_ratio)) for p, profile in profiles.items()}
     return {
         f"pole_thickness_ratio_at_{unit}": {p: profile.thickness_ratio[0] for p, profile in profiles.items()},
@@ -83,7 +83,7 @@ def report(path, mould, numbers: dict, pressures, out, name: str, **drawn) -> No
     for p in (f"{p:g}" for p in pressures):
         say(f"  {p:>6}" + "".join(f"{n[f'{key}_at_psi'][p]:{width}}" for key, width in (
             ("pole_thickness_ratio", "12.5f"), ("min_thickness_ratio", "12.5f"), ("min_thickness_at_R_cm", "10.3f"))))
-    write(path, mould, [path.met(fx.pressure(p)) for p in pressures], out, name, **drawn)
+    write(path, mould, [path.target_state(fx.pressure(p)) for p in pressures], out, name, **drawn)
 
 
 def write(path, tool, states, out, name: str, **drawn) -> None:

@@ -105,7 +105,7 @@ def vm201(size, out):
                      kinematics=fx.PlaneStrain(), supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z")],
                      contacts=[fx.Contact("outer", fx.tools.plane(200.0), "none", direction=(0, -1))])
     path = fx.trace(scene, until=fx.travel(100.0), intermediate=[fx.travel(50.0)], progress=False)
-    force = [path.met(fx.travel(half)).measures["tool_force"] for half in (50.0, 100.0)]
+    force = [path.target_state(fx.travel(half)).measures["tool_force"] for half in (50.0, 100.0)]
     return {"force_at_0.1": row(force[0], 250.0, "N"), "force_at_0.2": row(force[1], 1400.0, "N")}
 
 

@@ -52,8 +52,8 @@ def key_numbers(path, mould, room):
         "first_contact_pressure_psi": first_touch_at(path),
         "first_contact_at_Z_cm": touching(path, touch)[0],
         "filled_pressure_psi": filled_at(path, fillet, WALL / 2),
-        "pressure_psi_at_part_filled": {f"{part:g}": path.met(fx.enclosed_volume(part * room)).measures["pressure"]
-                                        for part in FILLED},
+        "pressure_psi_at_part_filled": {
+            f"{part:g}": path.target_state(fx.enclosed_volume(part * room)).measures["pressure"] for part in FILLED},
         "base_thickness_cm": t[0],
         "thickness_cm_at_height_cm": {f"{h:g}": np.interp(h, z[z > BASE + FILLET] - BASE, t[z > BASE + FILLET])
                                       for h in (1.0, 2.0, 4.0, 6.0, 8.0, 10.0, 11.0, 12.0, 13.0)},
@@ -90,7 +90,7 @@ def main():
             f" {n['cutbacks']} cut back, {n['solve_seconds']:.1f} s",
             "  height, cm  " + "".join(f"{h:>8}" for h in n["thickness_cm_at_height_cm"]),
             "  thickness   " + "".join(f"{t:8.4f}" for t in n["thickness_cm_at_height_cm"].values()))
-        states = [path.met(fx.enclosed_volume(part * room)) for part in FILLED] + [path.last]
+        states = [path.target_state(fx.enclosed_volume(part * room)) for part in FILLED] + [path.last]
         write(path, mould, states, args.out, name, along="reference arc length from the bottom")
         if not args.quick and friction == "stick":
             path.view3d(args.out / "parison_3d.png")

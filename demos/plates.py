@@ -51,7 +51,7 @@ def force(state) -> float:
 
 def forces(path, travels, keys) -> dict:
     """Return {key: force in N} at the travels that were met."""
-    met = {key: path.met(fx.travel(t)) for key, t in zip(keys, travels, strict=True)}
+    met = {key: path.target_state(fx.travel(t)) for key, t in zip(keys, travels, strict=True)}
     return {key: force(state) for key, state in met.items() if state is not None}
 
 

@@ -85,7 +85,8 @@ def run(case):
         "membrane_force_N": {f"{t:g}": float(np.interp(t, membrane.travel, membrane.force)) for t in travels},
         "columns": n, "columns_of_pilots": columns, "jumps": len(path.jumps), "ended": end,
         "reached_travel_cm": float(path["travel"].max()),
-        "first_verdict": next((f"{s.measures['travel']:.4g} cm: {s.verdict}" for s in path.states if s.verdict), ""),
+        "first_verdict": next((f"{s.measures['travel']:.4g} cm: {s.inadmissible_reason}" for s in path.states
+                               if s.inadmissible_reason), ""),
         **plugs.cost(path)}
     if path["travel"].max() >= MEAN[1]:
         numbers["mean_force_N"] = mean_force(path["travel"], plugs.NEWTON * path["tool_force"])
@@ -99,7 +100,7 @@ def run(case):
 
 def forces(path, travels) -> dict:
     """Return {travel as text: force in N} at the travels that a path met."""
-    met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
+    met = {f"{t:g}": path.target_state(fx.travel(t)) for t in travels}
     return {t: plugs.force(state) for t, state in met.items() if state is not None}
 
 

@@ -112,7 +112,7 @@ def membrane_curve(mu, fillet, last) -> Membrane:
 
 def at_travels(path, travels) -> dict:
     """Return forces and minimum walls at the travels that a path met."""
-    met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
+    met = {f"{t:g}": path.target_state(fx.travel(t)) for t in travels}
     met = {t: state for t, state in met.items() if state is not None}
     return {
         "force_N_at_travel_cm": {t: plugs.force(state) for t, state in met.items()},

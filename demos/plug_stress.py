@@ -86,7 +86,7 @@ def main():
             paths[law] = path = press(law, elements, args.fillet, args.travels)
             summary[law][mesh] = {"elements": list(elements)}
             for travel in sorted(args.travels):
-                state = path.met(fx.travel(travel))
+                state = path.target_state(fx.travel(travel))
                 corners[law] = Corners(path, state)
                 summary[law][mesh][f"{travel:g}"] = n = key_numbers(path, state, corners[law])
                 print_numbers(f"{law}, {elements[0]} x {elements[1]} elements, {travel:g} cm", n)

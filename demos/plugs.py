@@ -118,7 +118,7 @@ def travel_numbers(path, end, travels, places) -> dict:
 
     places: {name: reference radius}.
     """
-    met = {f"{t:g}": path.met(fx.travel(t)) for t in travels}
+    met = {f"{t:g}": path.target_state(fx.travel(t)) for t in travels}
     met = {key: state for key, state in met.items() if state is not None}
     shapes = {key: path.profile(state) for key, state in met.items()}
     return {
@@ -177,7 +177,7 @@ def print_numbers(name, n) -> None:
 
 def states(path, travels) -> list:
     """Return the states of the travels that were met, and the last one."""
-    found = [path.met(fx.travel(float(t))) for t in travels]
+    found = [path.target_state(fx.travel(float(t))) for t in travels]
     return [*(s for s in found if s is not None and s is not path.last), path.last]
 
 

@@ -80,13 +80,14 @@ def errors(kind, path, targets):
     exact pressure, as root mean square through the wall; the stress (radial, hoop, pressure) at the quadrature points.
     The last number is the estimated over the true error of the stress (effectivity), both integrated.
     """
-    pressure = max(abs(path.met(t).measures["pressure"] / exact(kind, d).pressure - 1) for d, t in targets.items())
+    pressure = max(abs(path.target_state(t).measures["pressure"] / exact(kind, d).pressure - 1)
+                   for d, t in targets.items())
     points, R, direction = through(kind, path.problem.scene.mesh, 101)
     reference = exact(kind, "10", R)
     state = path.state_at(fx.pressure(reference.pressure))           # before the sphere's maximum
     bounds = [fx.displacement(0.0, at=tuple(p), component="r").bind(path.problem) for p in points]
     u, true = np.array([path.value(b, state) for b in bounds]) / direction[0], reference.r - reference.R
-    field = path.stress(path.met(targets["10"]))
+    field = path.stress(path.target_state(targets["10"]))
     stress = field.at_quadrature_points()
     R = stress.points[:, 0] if kind == "tube" else np.hypot(*stress.points.T)
     face, reference = stress.on_face(direction if kind == "tube" else stress.points), exact(kind, "10", R)
@@ -107,7 +108,7 @@ def study(kind, counts):
         "elements_through_wall": counts[-1],
         "triangles": path.problem.forms.domain.topology.index_map(2).size_global,
         "pressure_MPa_at_inner_displacement_cm": {
-            d: path.met(t).measures["pressure"] * PSI for d, t in targets.items()},
+            d: path.target_state(t).measures["pressure"] * PSI for d, t in targets.items()},
         "exact_pressure_MPa_at_inner_displacement_cm": {d: exact(kind, d).pressure * PSI for d in DISPLACEMENTS},
         "largest_relative_error_of_pressure": runs[counts[-1]]["pressure"],
         "relative_errors_at_elements_through_wall": {str(n): e for n, e in runs.items()},
@@ -156,7 +157,7 @@ def table(cylinder, grids, sphere):
     def row(name, values):
         lines.append(f"{name:48}" + "".join(f"{v:10.6f}" for v in values))
     for n, (path, targets) in grids.items():
-        row(f"cylinder, {n} triangles", [path.met(t).measures["pressure"] * PSI for t in targets.values()])
+        row(f"cylinder, {n} triangles", [path.target_state(t).measures["pressure"] * PSI for t in targets.values()])
     for name, numbers in (("cylinder", cylinder), ("sphere", sphere)):
         row(f"{name}, {numbers['triangles']} triangles", numbers["pressure_MPa_at_inner_displacement_cm"].values())
         row("  exact", numbers["exact_pressure_MPa_at_inner_displacement_cm"].values())
@@ -197,7 +198,7 @@ def draw_wall(grids, path, targets, out):
     runs[f"{path.problem.forms.domain.topology.index_map(2).size_global} triangles"] = (path, targets)
     for (name, (run, targets)), style in zip(runs.items(), ("C1.--", "C0.-", "C2-"), strict=True):
         points, _, _ = through("tube", run.problem.scene.mesh, len(R))
-        stress = run.stress(run.met(targets["50"])).at_points(points)
+        stress = run.stress(run.target_state(targets["50"])).at_points(points)
         p = stress.hydrostatic_pressure
         misses[name] = float(np.abs(p - true.hydrostatic_pressure).max() / np.abs(true.hydrostatic_pressure).max())
         every = {"markevery": 8} if name.startswith(("6 ", "12 ")) else {}
@@ -255,7 +256,7 @@ def main():
     outer, inside = geometry_of_the_thesis()
     cylinder |= {
         "pressure_MPa_at_inner_displacement_cm_on_grid": {
-            str(k): {d: p.met(t).measures["pressure"] * PSI for d, t in targets.items()}
+            str(k): {d: p.target_state(t).measures["pressure"] * PSI for d, t in targets.items()}
             for k, (p, targets) in grids.items()},
         "hydrostatic_pressure_error": misses,
         "outer_radius_in_that_gives_1.26_MPa": outer, "inner_radius_in_that_gives_1.26_MPa": inside}

@@ -54,7 +54,7 @@ def inflate(elements, support):
 def key_numbers(path, support):
     """Return the numbers of the summary of one path."""
     def met(p):
-        state = path.met(fx.pressure(float(p)))
+        state = path.target_state(fx.pressure(float(p)))
         return None if state is None else state.measures["pole_height"]
 
     def timoshenko_over_ours(height_cm):

@@ -35,13 +35,14 @@ def inflate(mesh, support):
 def key_numbers(path):
     """Return the numbers of the summary of one path."""
     limit, profile = path.limit_points[0].measures, path.profile()
-    whole = path.met(fx.pole_stretch(float(STRETCHES[-1]))) is not None
+    whole = path.target_state(fx.pole_stretch(float(STRETCHES[-1]))) is not None
     return {
         "limit_pressure_kg_per_cm2": limit["pressure"],
         "limit_pole_stretch": limit["pole_stretch"],
         "limit_pole_height_cm": limit["pole_height"],
         "pressure_kg_per_cm2_at_stretch": {
-            s: met.measures["pressure"] if (met := path.met(fx.pole_stretch(float(s)))) else None for s in STRETCHES},
+            s: met.measures["pressure"] if (met := path.target_state(fx.pole_stretch(float(s)))) else None
+            for s in STRETCHES},
         "pole_thickness_cm": profile.thickness[0] if whole else None,
         "rim_thickness_ratio": profile.thickness_ratio[-1] if whole else None,
         "thickness_ratio_one_thickness_from_rim": profile.thickness_ratio_at(RADIUS - THICKNESS) if whole else None,

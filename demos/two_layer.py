@@ -35,7 +35,7 @@ def inflate(stack, elements):
 def levels(path):
     """Return the states at equal pressure (None if the path does not reach it) and at equal pole height."""
     reached = path["pressure"].max() > PRESSURE
-    return path.state_at(fx.pressure(PRESSURE)) if reached else None, path.met(fx.pole_height(HEIGHT))
+    return path.state_at(fx.pressure(PRESSURE)) if reached else None, path.target_state(fx.pole_height(HEIGHT))
 
 
 def interfaces(path, state, R):

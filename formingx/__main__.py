@@ -75,7 +75,7 @@ def _parser() -> argparse.ArgumentParser:
     report_ = commands.add_parser("report", help="make a report of a checkpoint", description="Make one HTML file of a"
                                   " checkpoint: inputs, curves, thickness, convergence.")
     status_ = commands.add_parser("status", help="show how far a run has come", description="Show where a run with a"
-                                  " checkpoint stands: stage, target, what limits its steps, verdict, time left.")
+                                  " checkpoint stands: stage, target, what limits its steps, admissibility, time left.")
     watch = commands.add_parser("watch", help="show the status again and again", description="Show the status of a run"
                                 " whenever it has new states, until it ends, has had none for --patience seconds, or"
                                 " Ctrl-C.")

@@ -65,7 +65,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
             enclosed volume grows, as with an air supply.
         resume: continue from the states in the checkpoint, which must be of this scene; begin if there are none.
         allow_inadmissible: continue, with a warning, through states that no body can have: self-penetrated, inside a
-            tool, with inverted elements. `State.verdict` gives the reason. By default the run ends there.
+            tool, with inverted elements. `State.inadmissible_reason` gives the reason. By default the run ends there.
         adapt_mesh: True to run twice: on the mesh of the scene, which may be coarse, and on `mesh.adapted(path)`. Or
             arguments of `adapted`, such as {"error": 0.02}. `Path.pilot` is the path of the first run, which may have
             ended before the target.
@@ -129,11 +129,11 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
 
         def part() -> None:
             """Continue the run from its last state, on the mesh of this state."""
-            on_the_way = [target for target in intermediate if len(path.segments) == 1 or path.met(target) is None]
+            on_the_way = [t for t in intermediate if len(path.segments) == 1 or path.target_state(t) is None]
             targets = [(target, target.bind(path.problem)) for target in (*on_the_way, until)]
             run = Run(path.record, targets, step, at_limit_point)
             run.follow(max_steps, progress, None if path.states else begin(path.record.curve), may_turn=True)
-        path.record.hooks.renew(part, lambda: path.last.met is not None and path.last.met[:2] == until[:2])
+        path.record.hooks.renew(part, lambda: path.last.target is not None and path.last.target[:2] == until[:2])
     return path
 
 

@@ -375,7 +375,7 @@ def test_a_path_is_judged_as_when_its_run_ended(caplog):
     said = [f.text for f in fx.check(path).findings if f.about == "plug"]
     assert said == [f.text for f in path.findings() if f.severity != "note"]
     assert all(text in caplog.text for text in said) and any("the tool turns by" in text for text in said)
-    path.last.verdict = "the body folds"
+    path.last.inadmissible_reason = "the body folds"
     assert [f.severity for f in fx.check(path).findings][0] == "serious"
 
 

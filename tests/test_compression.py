@@ -79,7 +79,7 @@ def roll_over(friction, step=None, **options):
     made = block(fx.MooneyRivlin(c10=0.1, c01=1.0), friction, (8, 8), roll_over=True, **options)
     targets = [fx.travel(HALF_HEIGHT * (1 - 1 / ratio)) for ratio in (1.87, 2.5, 3.4)]
     path = fx.trace(made, until=targets[-1], intermediate=targets[:-1], step=step, progress=False)
-    return [force(path.met(target)) for target in targets]
+    return [force(path.target_state(target)) for target in targets]
 
 
 @pytest.mark.parametrize("friction, refined", [
@@ -113,4 +113,4 @@ def test_forces_of_a_block_between_smooth_plates():
     for part, target in zip(parts, targets):
         l = 1 - part
         exact = 2 * (l**-2 - l) * (0.1 + 0.01 / l) * np.pi * 1.32**2
-        assert path.met(target).measures["tool_force"] == pytest.approx(exact, rel=1e-4)
+        assert path.target_state(target).measures["tool_force"] == pytest.approx(exact, rel=1e-4)

@@ -81,7 +81,7 @@ def plugged():
 def numbers(path):
     """At both targets. (How far other steps go is decided by tangents, which are known less well than states.)"""
     table, columns = path.contact(), ("tool_force", "pole_height", "contact_length")
-    met = [path.met(fx.travel(t)).measures[c] for t in (2.5, 3.0) for c in columns]
+    met = [path.target_state(fx.travel(t)).measures[c] for t in (2.5, 3.0) for c in columns]
     return np.concatenate([met, table.pressure, table.friction, table.points.ravel()])
 
 

@@ -252,4 +252,4 @@ def test_a_step_of_a_flow_ends_at_the_first_of_two_targets():
         stage = Stage("flow", control="air", amplitudes={fx.enclosed_volume: [(0, 0), (1, 1.0)]}, intermediate=through,
                       step=fx.StepControl(length=1.0))
         path = fx.Process(sheet(RELAXES, elements=(4, 1))).run([stage], progress=False, accuracy=0.5)
-        assert path.met(near).time < path.met(far).time
+        assert path.target_state(near).time < path.target_state(far).time

@@ -85,7 +85,7 @@ def test_thick_cylinder_and_sphere():
     path, targets = thick_cylinder.inflate("tube", thick_cylinder.wall("tube", 16))
     for at in ("10", "30", "50"):
         key = f"pressure_MPa_at_inner_displacement_cm/{at}"
-        found = path.met(targets[at]).measures["pressure"] * thick_cylinder.PSI
+        found = path.target_state(targets[at]).measures["pressure"] * thick_cylinder.PSI
         assert found == pytest.approx(stored("cylinder", key), rel=1e-7)
         exact = thick_cylinder.exact("tube", at).pressure * thick_cylinder.PSI
         assert exact == pytest.approx(stored("cylinder", f"exact_{key}"), rel=1e-7)

@@ -627,7 +627,7 @@ def test_findings_say_where_they_begin(formed):
 
 def test_the_report_names_an_inadmissible_state(inflated):
     record = report.of_path(inflated)
-    record.verdicts = ["the body folds" if k > 3 else "" for k in range(len(inflated))]
+    record.inadmissible_reasons = ["the body folds" if k > 3 else "" for k in range(len(inflated))]
     found, = record.all_findings()
     assert found.severity == "serious" and "From state 4 on" in found.text
     assert "must not be used: the body folds" in found.text

@@ -30,7 +30,7 @@ def test_target_force_of_a_ball(radius, force):
     scene = pushed(radius)
     path = fx.trace(scene, until=fx.force(force), intermediate=[fx.force(force / 3)], progress=False)
     assert path["tool_force"][-1] == pytest.approx(force, rel=1e-7) and travel(path) > 0 and len(path) < 15
-    assert path.met(fx.force(force / 3)).measures["tool_force"] == pytest.approx(force / 3, rel=1e-7)
+    assert path.target_state(fx.force(force / 3)).measures["tool_force"] == pytest.approx(force / 3, rel=1e-7)
     other = fx.trace(scene, until=fx.travel(travel(path)), progress=False)
     assert other["tool_force"][-1] == pytest.approx(force, rel=1e-6)
 

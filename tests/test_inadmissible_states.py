@@ -46,8 +46,8 @@ def test_a_run_ends_before_its_first_inadmissible_state(caplog):
     assert len(good) > 2 and max(inside_out(good, state) for state in good.states) <= 0.06
     assert "The last good state is" in str(error.value)
     path = fx.trace(foot(), until=fx.travel(-0.85), progress=False, allow_inadmissible=True)
-    verdicts = [state.verdict for state in path.states]
-    assert next(k for k, verdict in enumerate(verdicts) if verdict) == len(good)
+    reasons = [state.inadmissible_reason for state in path.states]
+    assert next(k for k, reason in enumerate(reasons) if reason) == len(good)
     assert "beyond travel" in caplog.text
 
 
@@ -107,8 +107,8 @@ def test_a_pole_with_negative_thickness_is_inadmissible():
 
 def test_an_admissible_state_has_no_warning():
     path = fx.trace(block(), until=fx.travel(0.3), progress=False)
-    verdict = AdmissibilityCheck(path.problem)
-    assert [verdict.reason(state) for state in path.states] == [""] * len(path)
+    check = AdmissibilityCheck(path.problem)
+    assert [check.reason(state) for state in path.states] == [""] * len(path)
 
 
 def test_contact_points_sink_by_less_than_a_seventh_of_the_wall():

@@ -204,7 +204,7 @@ def williams(**step):
 @pytest.mark.slow
 def test_forces_on_a_plug_do_not_depend_on_the_steps_and_its_work_is_accounted_for():
     found = weighed(williams), weighed(lambda: williams(length=0.01, largest=0.01))
-    forces = [[path.met(fx.travel(t)).measures["tool_force"] for t in range(1, 10)] for path, _ in found]
+    forces = [[path.target_state(fx.travel(t)).measures["tool_force"] for t in range(1, 10)] for path, _ in found]
     assert forces[0] == pytest.approx(forces[1], rel=3e-3)
     for path, slips in found:
         work, energy = work_and_energy(path)
@@ -288,6 +288,6 @@ def test_a_jump_that_is_solved_again_keeps_its_lost_work():
     curve, (*_, old, last) = path.segments[-1].curve, path.states
     jumped = replace(last, kind="jump", jump={"dissipated": 0.5}, direction=-last.direction, slope=-last.slope)
     found = curve.solve_again(jumped, fixed(jumped.control), old)
-    assert (found.kind, found.jump, found.met) == ("jump", jumped.jump, last.met)
+    assert (found.kind, found.jump, found.target) == ("jump", jumped.jump, last.target)
     assert found.slope == pytest.approx(jumped.slope, rel=1e-4) and found.direction @ jumped.direction > 0
     assert found.control == last.control and np.allclose(found.x, last.x, atol=1e-12)

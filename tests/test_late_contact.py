@@ -36,7 +36,7 @@ def test_no_point_penetrates_a_tool_at_a_target(drawn, more):
     path = fx.trace(draw(16.0, **more), until=targets[-1], intermediate=targets[:-1],
                     progress=False) if more else drawn
     for target in targets:
-        met = path.met(target).measures
+        met = path.target_state(target).measures
         assert abs(met["travel" if target.name == "travel" else "tool_force"]) == pytest.approx(target.value, rel=1e-8)
         assert met["penetration"] < 2e-3 * THICKNESS
     assert path["penetration"].max() > 0.05 * THICKNESS and serious(path) == []

@@ -239,7 +239,7 @@ def test_inflation_to_the_limit(material, caplog):
     caplog.set_level("INFO", "formingx")
     path = fx.trace(scene, until=fx.pole_stretch(0.998 * limit), step=fx.StepControl(length=2.0),
                     allow_inadmissible=True)
-    assert "volumes" in path.last.verdict and not path.states[len(path) // 2].verdict
+    assert "volumes" in path.last.inadmissible_reason and not path.states[len(path) // 2].inadmissible_reason
     assert path.counts.failures >= 1 and "was stretched beyond its limit, I1 <" in caplog.text
     assert path.counts.steps < 40 and path.last.measures["pole_stretch"] == pytest.approx(0.998 * limit, rel=1e-8)
 

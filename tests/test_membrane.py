@@ -69,9 +69,9 @@ def test_shape_converges_to_membrane_theory(c01):
         path = trace(sheet(n, fx.MooneyRivlin(c10=1.0, c01=c01)), targets[-1], intermediate=targets[:-1])
         row = []
         for target, exact in zip(targets, states):
-            profile = path.profile(path.met(target))
+            profile = path.profile(path.target_state(target))
             thickness = CubicSpline(exact.R, exact.thickness_ratio)(np.maximum(profile.reference_radius, exact.R[0]))
-            row += [path.met(target).measures["pressure"] / exact.pressure - 1,
+            row += [path.target_state(target).measures["pressure"] / exact.pressure - 1,
                     np.abs(profile.thickness_ratio / thickness - 1).max()]
         errors.append(np.abs(row))
     orders = np.log2(errors[1] / errors[2])
@@ -89,7 +89,7 @@ def test_table_of_a_mooney_disc():
     path = trace(scene, targets[-1], intermediate=targets[:-1])
     assert not path.limit_points
     for target, height in zip(targets, table.values()):
-        assert path.met(target).measures["pole_height"] == pytest.approx(height, abs=1e-3)
+        assert path.target_state(target).measures["pole_height"] == pytest.approx(height, abs=1e-3)
 
 
 @pytest.mark.parametrize("angle", [np.pi / 3, np.pi / 2])

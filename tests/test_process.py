@@ -327,7 +327,7 @@ def test_a_process_continues_from_any_state():
         if not state.stepping:
             continue
         kept = State(state.x, state.control, state.direction, state.slope, dict(state.measures), state.history,
-                        state.kind, state.met, state.history_variables, stage=state.stage,
+                        state.kind, state.target, state.history_variables, stage=state.stage,
                         setting=json.loads(json.dumps(state.setting)),
                         stepping=json.loads(json.dumps(state.stepping)))
         rest = run(plugged("stick"), *STAGES, start=kept)

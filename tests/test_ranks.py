@@ -118,8 +118,8 @@ if path.problem.comm.rank == 0:
 """
 
 
-def test_ranks_agree_on_a_process_and_on_verdicts():
-    """Plug, mould and relaxing material; runs that a verdict ends."""
+def test_ranks_agree_on_a_process_and_on_admissibility():
+    """Plug, mould and relaxing material; runs that an inadmissible state ends."""
     one, two = (run_json(VERDICT, ranks) for ranks in (1, 2))
     assert len(one["said"]) == 2 and "did not follow the tool" in one["said"][0] and "inside out" in one["said"][1]
     assert two["said"] == one["said"] and two["steps"] == one["steps"]

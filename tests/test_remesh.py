@@ -63,7 +63,7 @@ def test_stages_continue_on_new_meshes_without_repetition(monkeypatch):
     made = [state for state in path.states if state.kind == "remesh"]
     assert [state.stage for state in made] == ["press", "push", "back"]
     assert [state.stage for state in path.states if state.kind == "start"] == ["press", "push", "back"]
-    assert made[0].met[:2] == fx.travel(0.3)[:2]
+    assert made[0].target[:2] == fx.travel(0.3)[:2]
     assert all(state.time == pytest.approx(0.5) for state in path.states[path.states.index(made[0]):])
     assert np.all(np.diff(path["travel"][path.states.index(made[-1]):]) < 0)
     for travel, stage in ((0.5, "push"), (0.3, "back")):

@@ -59,11 +59,11 @@ def creeping(until=None, duration=60.0, **more):
 def test_a_stage_waits_for_a_sag():
     """It ends there, exactly; the same time as of a run that passes it; the next stage goes on from it."""
     path = creeping(fx.sag(0.05))
-    met = path.met(fx.sag(0.05))
+    met = path.target_state(fx.sag(0.05))
     assert met is path.state("sag") and met.measures["sag"] == pytest.approx(0.05, rel=1e-12)
     assert path.last.time == pytest.approx(met.time + 0.5) and path["sag"][-1] > 0.05
     passed = creeping(duration=1.2 * met.time, intermediate=[fx.sag(0.05)])
-    assert passed.met(fx.sag(0.05)).time == pytest.approx(met.time, rel=2e-3)
+    assert passed.target_state(fx.sag(0.05)).time == pytest.approx(met.time, rel=2e-3)
 
 
 def test_an_unreachable_sag_is_reported():

@@ -399,7 +399,7 @@ def test_states_at_targets_of_a_sliding_sheet_depend_on_no_steps(value):
     path, stopped, fine = (fx.trace(trough(0.1, friction="none"), until=until, progress=False, intermediate=[
         fx.pressure(p) for p in given]) for until, given in ((end, []), (target, []), (end, [*before, value])))
     assert path.state_at(target).measures[column] == pytest.approx(stopped.last.measures[column], rel=1e-9)
-    for other in (stopped.wall(), fine.wall(fine.met(target))):
+    for other in (stopped.wall(), fine.wall(fine.target_state(target))):
         np.testing.assert_allclose(path.wall(path.state_at(target)).ratio, other.ratio, rtol=1e-5)
     np.testing.assert_allclose(path.wall().ratio, fine.wall().ratio, rtol=1e-8)
 

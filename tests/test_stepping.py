@@ -62,7 +62,7 @@ def test_a_step_back_in_time_is_refused(monkeypatch):
 def test_convergence_needs_residual_and_correction():
     def met(corrections, residual, before=1.0):
         residuals = [*[1.0] * (len(corrections) - 1), before, residual]
-        return Tolerances(correction=1e-10, residual=1e-8).met(corrections, residuals[-len(corrections) - 1:])
+        return Tolerances(correction=1e-10, residual=1e-8).converged(corrections, residuals[-len(corrections) - 1:])
 
     assert met([1e-2, 1e-4, 1e-7], 1e-9)              # quadratic: the next would be 1e-13
     assert not met([1e-2, 1e-4, 1e-7], 1e-7)          # residual too large

@@ -39,7 +39,7 @@ def test_a_target_at_a_corner_of_a_table(corner):
     for stage in (Stage("move", amplitudes={"pull": QUICK}, intermediate=[fx.process_time(corner)]),
                   Stage("flow", control="pull", amplitudes={fx.travel: QUICK}, intermediate=[fx.process_time(corner)])):
         path = run(block(SLOW), stage, accuracy="draft", max_steps=200)
-        met = path.met(fx.process_time(corner))
+        met = path.target_state(fx.process_time(corner))
         assert met.time == pytest.approx(corner, rel=1e-12) and path.last.time == pytest.approx(4.0, rel=1e-12)
         assert met.measures["travel"] == pytest.approx(np.interp(corner, *np.transpose(QUICK)), abs=1e-9)
 
@@ -136,7 +136,7 @@ def test_accuracy_is_kept_while_a_body_cools(name):
 
     def heights(accuracy):
         path = run(scene, *stages, accuracy=accuracy)
-        return [path.met(fx.pressure(pressure)).measures["pole_height"], path.last.measures["pole_height"]]
+        return [path.target_state(fx.pressure(pressure)).measures["pole_height"], path.last.measures["pole_height"]]
     exact = heights(4e-4)
     for accuracy, promised in (("draft", 1e-2), ("standard", 2e-3)):
         assert heights(accuracy) == pytest.approx(exact, rel=promised)
@@ -148,7 +148,7 @@ def test_a_state_between_two_is_as_accurate_as_the_run(pressed):
         return [state.measures[c] for c in ("ball_force", "strain_energy", "dissipated_energy", "process_time")]
     for accuracy, step in ((1e-2, StepControl(target=8)), (1e-3, None)):
         path = run(sheet(0), Stage("in", **DOWN), accuracy=accuracy, step=step)
-        assert measured(path.state_at(BETWEEN)) == pytest.approx(measured(pressed.met(BETWEEN)), rel=accuracy)
+        assert measured(path.state_at(BETWEEN)) == pytest.approx(measured(pressed.target_state(BETWEEN)), rel=accuracy)
 
 
 def test_states_between_those_of_a_flow_are_refused():

@@ -192,7 +192,7 @@ def test_a_tool_takes_heat_only_where_and_while_it_touches():
     scene = cooled({"plug": (1000.0, 30.0)}, [plug], h=0)
     push = fx.Stage("push", control="plug", until=fx.travel(4e-3), intermediate=[fx.travel(0.4e-3)], duration=0.5)
     path = fx.Process(scene).run([push], progress=False, accuracy="draft")
-    with path.problem.state_context(path.met(fx.travel(0.4e-3))):
+    with path.problem.state_context(path.target_state(fx.travel(0.4e-3))):
         assert np.all(np.abs(path.problem.temperature.T.x.array - 150.0) < 1e-9)      # it has not come to the sheet yet
     *under, beside = path.temperature(np.array([[R, 1e-3] for R in (0.0, 0.002, 0.004, 0.006, 0.019)]))
     assert min(under) < 110 and beside > 149.9, under

@@ -192,7 +192,7 @@ def test_many_branches():
     material = fx.Viscoelastic(RUBBER, branches=[(0.03 * (1 + k % 3), float(t)) for k, t in enumerate(tau)])
     path = run(block(material), Stage("pull", control="pull", until=fx.travel(0.5)),
                Stage("hold", duration=10.0, intermediate=[fx.process_time(0.1)]))
-    for t, state in ((0.1, path.met(fx.process_time(0.1))), (10.0, path.last)):
+    for t, state in ((0.1, path.target_state(fx.process_time(0.1))), (10.0, path.last)):
         assert pull(path, state=state) == pytest.approx(material.relaxation("uniaxial", 1.5, t), rel=1e-2)
 
 
@@ -217,7 +217,7 @@ def test_accuracy_is_kept(accuracy):
     for stretch in (1.5, 4.0):
         path = run(block(), Stage("pull", control="pull", until=fx.travel(stretch - 1)),
                    Stage("hold", duration=5.0, intermediate=through), accuracy=accuracy)
-        found = [pull(path, state=path.met(t)) for t in through] + [pull(path)]
+        found = [pull(path, state=path.target_state(t)) for t in through] + [pull(path)]
         assert found == pytest.approx(P0.relaxation("uniaxial", stretch, times), rel=ACCURACY[accuracy])
 
 
@@ -228,7 +228,8 @@ def test_accuracy_of_thickness_and_of_the_snap():
                    Stage("creep", duration=1000.0, intermediate=[fx.pole_stretch(1.3)], at_limit_point="stop"),
                    accuracy=accuracy)
         assert path.limit_points and "limit point" in path.ended
-        return np.array([path.last.time, path.last.measures["pole_stretch"], path.met(fx.pole_stretch(1.3)).time])
+        met = path.target_state(fx.pole_stretch(1.3))
+        return np.array([path.last.time, path.last.measures["pole_stretch"], met.time])
     fine = snap(3e-5)
     assert snap("fine") == pytest.approx(fine, rel=1e-3)
 
@@ -237,7 +238,7 @@ def test_constant_rate_as_a_function_of_time():
     rate, end = 0.7, np.log(3.0) / 0.7
     path = run(block(P1), Stage("pull", control="pull", amplitudes={fx.travel: lambda t: np.expm1(rate * t)},
                                 until=fx.process_time(end), intermediate=[fx.process_time(end / 2)]), accuracy="fine")
-    for t, state in ((end / 2, path.met(fx.process_time(end / 2))), (end, path.last)):
+    for t, state in ((end / 2, path.target_state(fx.process_time(end / 2))), (end, path.last)):
         assert pull(path, state=state) == pytest.approx(P1.constant_rate("uniaxial", rate, [np.exp(rate * t)])[0],
                                                         rel=ACCURACY["fine"])
 
@@ -252,7 +253,7 @@ def test_recovery_after_creep():
     begin = next(s for s in path.states if s.stage == "recovery")
     assert begin.time == 5.0 and np.all(np.diff(path["process_time"]) >= 0)
     assert np.abs(path["support_force"][path.states.index(begin):]).max() < 1e-8
-    stretch = [1 + s.measures["travel"] for s in (path.met(force), begin, path.last)]
+    stretch = [1 + s.measures["travel"] for s in (path.target_state(force), begin, path.last)]
     assert stretch == pytest.approx([1.0906606, 1.1651652, 1.0951243], rel=2e-3)          # an ODE solver's
 
 

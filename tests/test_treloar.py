@@ -57,7 +57,7 @@ def test_a_limit_point_behind_the_state_is_not_taken_for_the_next(monkeypatch):
 @pytest.mark.quick
 def test_targets_are_hit_exactly(path):
     for stretch in (*STRETCHES, 8.5):
-        assert path.met(fx.pole_stretch(stretch)).measures["pole_stretch"] == pytest.approx(stretch, rel=1e-9)
+        assert path.target_state(fx.pole_stretch(stretch)).measures["pole_stretch"] == pytest.approx(stretch, rel=1e-9)
     assert path.last.measures["pole_stretch"] == pytest.approx(8.5, rel=1e-9)
     assert np.all(np.diff(path["pole_stretch"]) > 0)
 
@@ -92,7 +92,7 @@ def test_cost_does_not_depend_on_the_penalty(eps, support):
 @pytest.mark.parametrize("stretch", [1.2, 2.0, 8.5])
 def test_newton_is_quadratic(path, stretch):
     """From half as far away the error after one iteration, which is the second correction, is a quarter."""
-    curve, state = Curve(path.problem, fx.Tolerances()), path.met(fx.pole_stretch(stretch))
+    curve, state = Curve(path.problem, fx.Tolerances()), path.target_state(fx.pole_stretch(stretch))
     away, found = path.states[path.states.index(state) - 1].x - state.x, []
     for share in (2e-3, 1e-3):
         again = curve.solve(state.x + share * away, state.control, fixed(state.control), "step", state)

@@ -9,10 +9,11 @@ from ..results.evaluate import edges, resticking, snaps, tension, volume
 
 @register("end")
 def inadmissible(path: Any) -> Iterator[Finding]:
-    """Report the first inadmissible state of a `Path`: no real body can have it (`State.verdict`)."""
-    bad = next((state for state in path.states if state.verdict), None)
+    """Report the first inadmissible state of a `Path`: no real body can have it (`State.inadmissible_reason`)."""
+    bad = next((state for state in path.states if state.inadmissible_reason), None)
     if bad is not None:
-        yield Finding("serious", "state", f"from {path.describe(bad)} on the results must not be used: {bad.verdict}")
+        yield Finding("serious", "state", f"from {path.describe(bad)} on the results must not be used:"
+                                          f" {bad.inadmissible_reason}")
 
 
 @register("end")

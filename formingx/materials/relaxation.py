@@ -53,7 +53,7 @@ def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
     return found
 
 
-class Relaxing(Material):
+class RelaxingMaterial(Material):
     """Base class of materials that relax to an equilibrium.
 
     Subclasses add their own constants to `parameters` and call `check`. They define `_modulus(times)`, the relaxation

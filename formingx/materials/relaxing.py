@@ -29,11 +29,11 @@ from . import branches as tests
 from .constants import OfTemperature, Sample
 from .homogeneous import MODES
 from .material import Material, brief
-from .relaxation import Relaxing, checked_pairs, checked_shift
+from .relaxation import RelaxingMaterial, checked_pairs, checked_shift
 from .tensors import IDENTITY, Entries, entries, inner, isochoric
 
 
-class RelaxingMaterial(Relaxing):
+class GeneralisedMaxwell(RelaxingMaterial):
     r"""Base class of materials with an equilibrium energy and relaxing branches; subclasses define the law of a branch.
 
     .. math:: W = W_{eq}(F) + \sum_k \frac{\mu_k}{2} \left[\mathrm{tr}(\bar C M_k) - 3\right]

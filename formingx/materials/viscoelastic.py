@@ -7,11 +7,11 @@ import ufl
 
 from ..errors import known
 from .material import Material
-from .relaxing import RelaxingMaterial
+from .relaxing import GeneralisedMaxwell
 from .tensors import cofactor, determinant, deviator_squared, entries, inner, plus
 
 
-class Viscoelastic(RelaxingMaterial):
+class Viscoelastic(GeneralisedMaxwell):
     r"""Finite viscoelasticity with Gaussian springs.
 
     .. math::
@@ -48,7 +48,7 @@ class Viscoelastic(RelaxingMaterial):
         equilibrium: material that describes the relaxed state; None if all stress relaxes.
         branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
         order: order of a step in time, 2 or 1.
-        shift: law aT(T) of the temperature, a factor of the relaxation times, see `RelaxingMaterial`; None: no
+        shift: law aT(T) of the temperature, a factor of the relaxation times, see `GeneralisedMaxwell`; None: no
             dependence.
 
     >>> melt = fx.Viscoelastic(fx.NeoHookean(c10=0.1), branches=[(0.6, 0.1), (0.3, 2.0)])
@@ -102,7 +102,7 @@ class Viscoelastic(RelaxingMaterial):
         return m - m.mean(axis=-1, keepdims=True)
 
 
-class TransientNetwork(RelaxingMaterial):
+class TransientNetwork(GeneralisedMaxwell):
     r"""Networks whose chains break and form again stress-free, equal to the upper-convected Maxwell law.
 
     The law is by Green and Tobolsky (1946). The Kirchhoff stress of a branch, besides a pressure, is
@@ -128,7 +128,7 @@ class TransientNetwork(RelaxingMaterial):
     Args:
         equilibrium: material that describes the relaxed state; None if all stress relaxes.
         branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
-        shift: law aT(T) of the temperature, a factor of the relaxation times, see `RelaxingMaterial`; None: no
+        shift: law aT(T) of the temperature, a factor of the relaxation times, see `GeneralisedMaxwell`; None: no
             dependence.
 
     >>> fx.TransientNetwork(None, branches=[(0.05, 1.0)]).shear_modulus

@@ -152,13 +152,13 @@ class States:
         """The last accepted state."""
         return self.record.last
 
-    def met(self, target: Target) -> State | None:
+    def target_state(self, target: Target) -> State | None:
         """Return the state in which the run met one of its targets exactly, or None if no state met it.
 
         Args:
             target: a target of the run (`until` or `intermediate`), or an equal one.
         """
-        return next((state for state in self.states if state.met and state.met[:2] == target[:2]), None)
+        return next((state for state in self.states if state.target and state.target[:2] == target[:2]), None)
 
     def value(self, measure: str | Quantity, state: State) -> float:
         """Return an output quantity in a state, in the units of the script.
@@ -291,7 +291,7 @@ class States:
                              f" quantity: no state can be solved for there afterwards; run with intermediate=[...] to"
                              f" have one")
         record = Record(segment.problem, segment.curve)
-        record.segments[-1].states.append(replace(left, met=None))
+        record.segments[-1].states.append(replace(left, target=None))
         record.stage = left.stage
         before = segment.states[: segment.states.index(left) + 1]
         data: dict[str, Any] = next((s.stepping for s in reversed(before) if s.stepping and s.setting == left.setting),

@@ -22,13 +22,13 @@ class MirrorPlane(NamedTuple):
         axis: index of the coordinate that is constant in the plane, 0 or 1.
         position: value of that coordinate, length.
         above: True if the body lies on the side of larger values of this coordinate.
-        on: name of the boundary of the body that lies in the plane.
+        boundary: name of the boundary of the body that lies in the plane.
     """
 
     axis: int
     position: float
     above: bool
-    on: str
+    boundary: str
 
 
 class MirrorPlanes:

@@ -299,10 +299,10 @@ class Curve(StateSolver):
             Failure: no such state was found.
         """
         limit, (new, *rest) = self.problem.limit, states
-        quantity = next((quantity for target, quantity in targets if target is new.met), None)
+        quantity = next((quantity for target, quantity in targets if target is new.target), None)
         if limit is None or new.kind == "limit point":
             return states
-        equation = fixed(new.control) if quantity is None or new.met is None else quantity.equation(new.met.value)
+        equation = fixed(new.control) if quantity is None or new.target is None else quantity.equation(new.target.value)
         for sweep in range(self.sweeps):
             late, variables = limit.close_penetrated(new, quantity is not None, sweep), self.problem.history_variables
             if not late and (quantity is None or sweep > self.sweeps / 2 or not limit.renew_pressure(new)):
@@ -312,7 +312,7 @@ class Curve(StateSolver):
             except Failure as failure:
                 if late:
                     raise
-                log.info("the contact pressure at %s stays that of the last solution: %s", new.met, failure.reason)
+                log.info("the contact pressure at %s stays that of the last solution: %s", new.target, failure.reason)
                 self.problem.history_variables = variables
                 return [new, *rest]
         raise Failure("points that come into contact late bring others into their tool again and again", [])

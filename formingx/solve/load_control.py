@@ -89,7 +89,7 @@ class FixedControl:
         self.history.append(Iteration(left, correction, work / self._work if self._work else 1.0))
         if not np.isfinite(left):
             return int(PETSc.SNES.ConvergedReason.DIVERGED_FNORM_NAN)
-        if self._tolerances.met([i.correction for i in self.history[1:]], [i.residual for i in self.history]):
+        if self._tolerances.converged([i.correction for i in self.history[1:]], [i.residual for i in self.history]):
             return int(PETSc.SNES.ConvergedReason.CONVERGED_SNORM_RELATIVE)
         return int(PETSc.SNES.ConvergedReason.ITERATING)
 

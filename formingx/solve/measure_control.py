@@ -193,7 +193,8 @@ class QuantityRun(Run):
         problem, best = self.problem, new
         for target, quantity in self.targets.open:
             if target.name == "process_time":
-                new.met = target if abs(target.value - new.time) <= SAME_TIME * max(abs(new.time), 1e-300) else new.met
+                if abs(target.value - new.time) <= SAME_TIME * max(abs(new.time), 1e-300):
+                    new.target = target
                 continue
             values = []
             for state in (old, new):
@@ -202,7 +203,7 @@ class QuantityRun(Run):
             if values[0] * values[1] < 0:
                 found = self._state_at_target(old, target, quantity, old.time, new.time)
                 best = found if found.time < best.time else best
-        if best.met is not None:
+        if best.target is not None:
             best.kind = "target"
         return best
 
@@ -229,7 +230,7 @@ class QuantityRun(Run):
         state = found[time]
         if not is_met(target, quantity.size, miss + target.value) and abs(miss) > most:
             raise Failure(f"{target} was passed but could not be solved for", [])
-        state.met = target
+        state.target = target
         return state
 
 

@@ -110,7 +110,8 @@ class Tolerances:
         count("Tolerances: iterations", self.iterations)
         count("Tolerances: settling", self.settling)
 
-    def met(self, corrections: list[float], residuals: list[float], chord: bool = False, smooth: bool = False) -> bool:
+    def converged(self, corrections: list[float], residuals: list[float], chord: bool = False,
+                  smooth: bool = False) -> bool:
         """Return True if an iteration has converged, to its tolerances or to round-off.
 
         One of these conditions must hold. A value no longer decreases if it is above 0.3 times the value before.
@@ -325,7 +326,7 @@ class BorderedNewton:
                 raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
             if history:
                 self._modified.note_iteration(history[-1].chord, residual / (history[-1].residual or 1.0))
-            if self.tolerances.met([i.correction for i in history], [*(i.residual for i in history), residual],
+            if self.tolerances.converged([i.correction for i in history], [*(i.residual for i in history), residual],
                                    bool(history) and history[-1].chord, not problem.has_kinks):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history

@@ -103,7 +103,7 @@ class Run:
                 self.step = StepControl(**kept.get("step", {}))
             else:
                 self.step = replace(self._step)
-            self.targets.close_met(record.last)
+            self.targets.close_reached(record.last)
             self._complete_step()
             while self.targets.is_open():
                 if max_steps is not None and record.counts.steps - before >= max_steps:
@@ -117,7 +117,7 @@ class Run:
                         record.ended = f"the {self._control_name} has a limit point at {record.describe(state)}"
                     if record.ended or self.problem.has_history or self._jumps.rule == "snap_through":
                         break                           # the next step starts from this state
-                    if not self.targets.is_open() and state.met is self.targets.until:
+                    if not self.targets.is_open() and state.target is self.targets.until:
                         break
                 self._complete_step()
                 warn_of_branches(record, self.states[len(states) - 1:])
@@ -175,7 +175,7 @@ class Run:
         for state in self.states:
             with self.problem.state_context(state):
                 targets.add_known(state)
-        met = [s.met[:2] for s in self.states if s.met]
+        met = [s.target[:2] for s in self.states if s.target]
         targets.open = [(target, quantity) for target, quantity in targets.open if target[:2] not in met]
         kept = next((s.stepping for s in reversed(self.states) if s.stepping), {})
         self._jumps.change, no_equilibrium_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
@@ -269,7 +269,7 @@ class Run:
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _PassedState("the target was met on a distant part of the path", [])
-            new.met = target
+            new.target = target
         rejection = limit and limit.check(old, new, reach, ends=True)
         if rejection:
             part = min(max(rejection.fraction, 0.1), self.settings.snap_through.most_of_step(self.curve.iterations))
@@ -339,7 +339,8 @@ class Run:
         """
         new = self._jumps.jump(old, length, self._sense, self.states,
                                lambda: self._progress.limited("a jump", self.step.length), work_sign)
-        new = self.curve.close_penetrated(old, [replace(new, met=self.targets.met_by(new))], self.targets.open)[0]
+        new = replace(new, target=self.targets.reached_target(new))
+        new = self.curve.close_penetrated(old, [new], self.targets.open)[0]
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
@@ -373,7 +374,7 @@ class Run:
                 raise Failure("a limit point lies ahead, but it was located behind the last state", [])
             found.append(limit)
         for target, quantity in self.targets.open:
-            if target is new.met:
+            if target is new.target:
                 continue
             a, b = (self.curve.value(quantity, s.x, s.control) - target.value for s in (old, new))
             if a * b < 0:
@@ -381,7 +382,7 @@ class Run:
                     state = self.curve.state_at_value(old, new, quantity, target.value)
                 except Failure as failure:
                     raise Failure(f"{target} was passed but could not be solved for: {failure.reason}", []) from None
-                state.met = target
+                state.target = target
                 found.append(state)
         found.sort(key=lambda state: self.curve.progress(old, state))
         return self.curve.close_penetrated(old, [*found, new], self.targets.open)

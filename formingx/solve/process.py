@@ -130,8 +130,8 @@ class Execution:
         A remeshing within a stage starts a new run. Intermediate targets that this stage met on an earlier mesh are
         left out.
         """
-        met = [s.met[:2] for segment in self.record.segments[:-1] for s in segment.states
-               if s.met and s.setting["stage"] == self._k]
+        met = [s.target[:2] for segment in self.record.segments[:-1] for s in segment.states
+               if s.target and s.setting["stage"] == self._k]
         return [(target, quantity) for target, quantity in self._targets[self._k]
                 if target[:2] not in met or target not in self._stage.intermediate]
 
@@ -388,7 +388,7 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
     if last.setting["stage"] < len(plans) - 1:
         return False
     if plan.stage.until is not None:
-        return last.met is not None and last.met[:2] == plan.stage.until[:2]
+        return last.target is not None and last.target[:2] == plan.stage.until[:2]
     if not (plan.by_time or plan.prescribes_quantity):
         return not last.setting["fading"] or last.control == 1.0
     first = next(s for s in record.states if s.setting["stage"] == last.setting["stage"])

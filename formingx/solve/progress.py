@@ -80,18 +80,18 @@ class RunTargets:
             state: the accepted state.
         """
         self.values.append(self._curve.value(self.quantity, state.x, state.control))
-        self.open = [(t, b) for t, b in self.open if t is not state.met     # other targets may be met, too
+        self.open = [(t, b) for t, b in self.open if t is not state.target     # other targets may be met, too
                      and not is_met(t, b.size, self._curve.value(b, state.x, state.control))]
 
-    def met_by(self, state: State) -> Target | None:
+    def reached_target(self, state: State) -> Target | None:
         """Return the first open target that a state meets to round-off, or None."""
         return next((target for target, quantity in self.open
                      if is_met(target, quantity.size, self._curve.value(quantity, state.x, state.control))), None)
 
-    def close_met(self, start: State) -> None:
+    def close_reached(self, start: State) -> None:
         """Take the targets that the first state of the run, `start`, meets already, out of `open`."""
-        while (target := self.met_by(start)) is not None:
-            start.met = start.met or target
+        while (target := self.reached_target(start)) is not None:
+            start.target = start.target or target
             self.open = [(t, b) for t, b in self.open if t is not target]
 
     def within_reach(self, old: State, length: float) -> tuple[Target | None, Quantity | None, float]:

@@ -175,15 +175,15 @@ class Record:
         try:
             for listener in self.hooks.on_state:
                 listener(state)
-            state.verdict = self.judge(state)
-            if state.verdict and not self.allow_inadmissible:
-                raise InadmissibleState(state.verdict)
+            state.inadmissible_reason = self.judge(state)
+            if state.inadmissible_reason and not self.allow_inadmissible:
+                raise InadmissibleState(state.inadmissible_reason)
         except BaseException:
             self.segments[-1].states.pop()
             problem.history_variables = variables
             raise
-        if state.verdict and not any(s.verdict for s in self.states[-2:-1]):
-            log.warning("beyond %s: %s", self.describe(state), state.verdict)
+        if state.inadmissible_reason and not any(s.inadmissible_reason for s in self.states[-2:-1]):
+            log.warning("beyond %s: %s", self.describe(state), state.inadmissible_reason)
         self.counts.steps += state.kind != "start"
 
     def complete_step(self, step: StepControl, until: Target, **entries: Any) -> None:

@@ -23,7 +23,7 @@ class State:
         kind: "start", "step", "target", "limit point" or "jump" (the body snapped to this state).
         jump: of a "jump": {"dissipated": energy lost in the snap-through (stress length^3), "moved": displacement from
             the state before, mean over the volume of the body (length)}.
-        met: the target that the state meets exactly, or None.
+        target: the target that the state meets exactly, or None.
         history_variables: history variables of the problem after this state (`Problem.histories`).
         history_variables_before: history variables with which the state was solved for; empty in a loaded path.
         stage: name of the stage of a process.
@@ -33,8 +33,8 @@ class State:
         time: process time.
         orientation: sign of det(dF/dx) times the sign of the slope; 0 if it is not known. It is constant along a path,
             also through limit points, and changes its sign where another path branches off.
-        verdict: reason for which no body can have this state, as text; "" for an admissible state. A run continues past
-            an inadmissible state only with `allow_inadmissible=True`.
+        inadmissible_reason: reason for which no body can have this state, as text; "" for an admissible state. A run
+            continues past an inadmissible state only with `allow_inadmissible=True`.
 
     >>> state = path.limit_points[0]
     >>> state.kind, round(float(state.measures["pressure"]), 4), len(state.history)
@@ -48,7 +48,7 @@ class State:
     measures: dict[str, float] = field(default_factory=dict)
     history: list[Any] = field(default_factory=list)
     kind: str = "step"
-    met: Target | None = None
+    target: Target | None = None
     history_variables: list[Any] = field(default_factory=list)
     history_variables_before: list[Any] = field(default_factory=list)
     stage: str = ""
@@ -57,7 +57,7 @@ class State:
     time: float = 0.0
     jump: dict[str, Any] = field(default_factory=dict)
     orientation: int = 0
-    verdict: str = ""
+    inadmissible_reason: str = ""
 
     def __repr__(self) -> str:
         numbers = ", ".join(f"{name}={value:.6g}" for name, value in self.measures.items())

@@ -190,7 +190,8 @@ class StateSolver:
         """
         found = self.solve(new.x, new.control, equation, new.kind, old)
         sense = float(np.sign(found.slope * new.slope)) or 1.0
-        return replace(found, direction=sense * found.direction, slope=sense * found.slope, met=new.met, jump=new.jump)
+        return replace(found, direction=sense * found.direction, slope=sense * found.slope, target=new.target,
+                       jump=new.jump)
 
     def look_ahead(self, state: State) -> None:
         """Compute the path tangent of an accepted state for the next step, with updated history variables.

@@ -111,7 +111,7 @@ class _PerturbedPaths:
                     run.problem.advance(run.x, run.control)
                 self._copy_contact_status(state)
             before = state
-        if states[-1].met is None:
+        if states[-1].target is None:
             raise Failure("it did not reach its target", [])
 
     def _start(self, state: State) -> None:
@@ -285,7 +285,7 @@ class _PerturbedPaths:
             base, *others = (target.bind(problem).equation(target.value) for problem, target in targets)
             self._targets[key] = base, others
         target = self._end if p is None else p.stage.until
-        if state.met is None or state.met[:2] != target[:2]:
+        if state.target is None or state.target[:2] != target[:2]:
             raise Failure(f"it did not reach its target {target}", [])
         return self._targets[key]
 

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import InputError, file_path
 from ...figures import Axes
 from ...materials.material import Material
-from ...materials.relaxing import RelaxingMaterial
+from ...materials.relaxing import GeneralisedMaxwell
 from ...values.intervals import t_intervals
 from .fit_in_time import TimedTest, fit_timed_tests
 from .fit_plot import draw_fit
@@ -28,7 +28,7 @@ _FIRST_EVALUATIONS = 20
 _LAST_EVALUATIONS = 400
 """Largest number of evaluations from each of the best three results, to refine them."""
 
-IN_TIME: list[tuple[type, Callable]] = [(RelaxingMaterial, fit_timed_tests)]
+IN_TIME: list[tuple[type, Callable]] = [(GeneralisedMaxwell, fit_timed_tests)]
 """Classes of materials that are fitted to tests in time, each with the function that fits it."""
 
 

@@ -17,7 +17,7 @@ from ...errors import InputError, count, finite_array, positive, several
 from ...materials import branches, homogeneous
 from ...materials.hyperelastic import NeoHookean
 from ...materials.material import Material
-from ...materials.relaxing import RelaxingMaterial
+from ...materials.relaxing import GeneralisedMaxwell
 from .uncertainty import Uncertainty, uncertainty
 from .weights import divisors, in_range
 
@@ -90,9 +90,9 @@ class TimedTest(NamedTuple):
         return cls(mode, times, l, np.append(np.nan, stress), "strain")
 
 
-def fit_timed_tests(material: type[RelaxingMaterial] | RelaxingMaterial, tests: Any, terms: int | None, relative: bool,
-                   weights: list[float], within: Any
-                   ) -> tuple[RelaxingMaterial, dict[str, float], list[TimedTest], Uncertainty]:
+def fit_timed_tests(material: type[GeneralisedMaxwell] | GeneralisedMaxwell, tests: Any, terms: int | None,
+                   relative: bool, weights: list[float], within: Any
+                   ) -> tuple[GeneralisedMaxwell, dict[str, float], list[TimedTest], Uncertainty]:
     """Fit the constants of a relaxing material to tests in time.
 
     Args:
@@ -112,7 +112,7 @@ def fit_timed_tests(material: type[RelaxingMaterial] | RelaxingMaterial, tests: 
     """
     law = material if isinstance(material, type) else type(material)
     data = _TimedData(checked_tests(tests, within), law, relative, weights)
-    if isinstance(material, RelaxingMaterial):
+    if isinstance(material, GeneralisedMaxwell):
         if terms is not None:
             raise InputError(f"fit: terms = {terms!r}: {material} has its branches already")
         best = _fit_branches(data, material, len(material.branches))
@@ -155,7 +155,7 @@ def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
     return found
 
 
-def _initial_material(kind: type[RelaxingMaterial]) -> RelaxingMaterial:
+def _initial_material(kind: type[GeneralisedMaxwell]) -> GeneralisedMaxwell:
     """Return the initial material of a class: a neo-Hookean equilibrium and one branch, with all constants 1."""
     return kind(NeoHookean(c10=1.0), [(1.0, 1.0)])
 
@@ -182,7 +182,7 @@ class _TimedData:
         InputError: the times of each test are all the same.
     """
 
-    def __init__(self, tests: list[TimedTest], law: type[RelaxingMaterial], relative: bool, weights: list[float]):
+    def __init__(self, tests: list[TimedTest], law: type[GeneralisedMaxwell], relative: bool, weights: list[float]):
         self.tests = tests
         measured = [np.isfinite(t.stress) for t in self.tests]
         self.stress = np.concatenate([t.stress[m] for t, m in zip(self.tests, measured)])
@@ -217,7 +217,7 @@ class _TimedData:
         values = material.parameters.values() if constants is None else constants
         return material.response.stress(self._stretches, values)[0]
 
-    def stresses(self, material: RelaxingMaterial, constants: np.ndarray) -> np.ndarray:
+    def stresses(self, material: GeneralisedMaxwell, constants: np.ndarray) -> np.ndarray:
         """Return the nominal stresses of a relaxing material with other constants at all points, shape (n,).
 
         Args:
@@ -229,12 +229,12 @@ class _TimedData:
         log_tau = np.clip(np.log(tau), self.log_tau[0], self.log_tau[-1])
         return self.equilibrium_stress(material.equilibrium, constants[:n]) + self.branch(log_tau) @ mu
 
-    def uncertainty(self, material: RelaxingMaterial) -> Uncertainty:
+    def uncertainty(self, material: GeneralisedMaxwell) -> Uncertainty:
         """Return the uncertainty of the fitted constants of a relaxing material."""
         return uncertainty(lambda x: self.stresses(material, x), material.parameters, self.stress, self.sizes)
 
 
-def _fit_branches(data: _TimedData, material: RelaxingMaterial, n: int) -> tuple[RelaxingMaterial, float]:
+def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tuple[GeneralisedMaxwell, float]:
     """Fit the constants of a relaxing material with n branches to the tests.
 
     Args:
@@ -273,14 +273,14 @@ def _fit_branches(data: _TimedData, material: RelaxingMaterial, n: int) -> tuple
         raise InputError(f"fit: {material} has no finite stress at some stretch of the data: start with constants whose"
                          f" limit lies beyond them")
     cost, start, x = min(trials, key=lambda trial: trial[0])
-    best = cast(RelaxingMaterial, start.with_constants(start.constants_at(x)))
+    best = cast(GeneralisedMaxwell, start.with_constants(start.constants_at(x)))
     constants = [] if (equilibrium := best.equilibrium) is None else list(equilibrium.parameters.values())
     ordered = sorted(best.branches, key=lambda pair: pair[1])
-    best = cast(RelaxingMaterial, best.with_constants([*constants, *np.ravel(ordered)]))
+    best = cast(GeneralisedMaxwell, best.with_constants([*constants, *np.ravel(ordered)]))
     return best, float(np.sqrt(2 * cost / len(data.stress)))
 
 
-def _guesses(data: _TimedData, material: RelaxingMaterial, n: int) -> list[RelaxingMaterial]:
+def _guesses(data: _TimedData, material: GeneralisedMaxwell, n: int) -> list[GeneralisedMaxwell]:
     """Return materials with n branches from which a fit starts.
 
     Two are made from the spectrum that fits best. The given material is the third if it has n branches.

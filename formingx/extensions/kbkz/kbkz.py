@@ -22,7 +22,7 @@ from ...materials import branches
 from ...materials.constants import OfTemperature, Sample
 from ...materials.homogeneous import MODES
 from ...materials.material import Material
-from ...materials.relaxation import Relaxing, checked_pairs, checked_shift
+from ...materials.relaxation import RelaxingMaterial, checked_pairs, checked_shift
 from ...materials.tensors import inner, isochoric
 from .damping import Damping
 from .integral import MemoryIntegral
@@ -34,7 +34,7 @@ _PANEL_STRAIN = 0.25
 """Largest change of logarithmic strain in a panel of the memory integral."""
 
 
-class KBKZ(Relaxing):
+class KBKZ(RelaxingMaterial):
     r"""Factorised K-BKZ material, for a melt that is undeformed before the run.
 
     .. math:: \tau = \int_{-\infty}^{t} \sum_k \frac{G_k}{\tau_k} e^{-(t - t')/\tau_k} \, h(I_1, I_2) \, B(t, t') \, dt'

@@ -346,7 +346,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
     start = curve.resume(x, control)
     if start.slope * state.slope < 0:
         start.direction, start.slope, start.orientation = -start.direction, -start.slope, -start.orientation
-    start.kind, start.jump, start.met = "remesh", {"volume": volume}, state.met
+    start.kind, start.jump, start.target = "remesh", {"volume": volume}, state.target
     record.counts.iterations += curve.spent()
     return Segment(problem, curve), start
 

@@ -287,8 +287,8 @@ def _read_state(data: dict, problem: Any) -> State:
     arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
               for name in FIELDS}
     met, stored = data.pop("met"), (f.name for f in fields(State) if f.name not in (*FIELDS, *HISTORIES))
-    return State(**arrays, met=Target(met[0], met[1], None, met[2]) if met else None,
-                 history=[Iteration(*row) for row in data.pop("history")],
+    return State(**arrays, target=Target(met[0], met[1], None, met[2]) if met else None,
+                 history=[Iteration(*row) for row in data.pop("history")], inadmissible_reason=data.pop("verdict"),
                  history_variables=_read_history_variables(problem, data.pop("memory")),
                  **{name: data[name] for name in stored if name in data})
 
@@ -337,10 +337,10 @@ def _tail(space: Any, owned: np.ndarray) -> list[float]:
 
 def _plain_state(state: State) -> dict[str, Any]:
     """Return the attributes of a state as JSON data, without its unknowns and history variables."""
-    excluded = (*FIELDS, *HISTORIES, "met", "history")
+    excluded = (*FIELDS, *HISTORIES, "target", "history", "inadmissible_reason")
     data = {f.name: getattr(state, f.name) for f in fields(State) if f.name not in excluded}
-    return data | {"met": state.met and [state.met.name, state.met.value, state.met.signed],
-                   "history": [list(i) for i in state.history]}
+    return data | {"met": state.target and [state.target.name, state.target.value, state.target.signed],
+                   "verdict": state.inadmissible_reason, "history": [list(i) for i in state.history]}
 
 
 def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> list[Any]:

@@ -28,7 +28,7 @@ class Status:
     Attributes:
         states: number of states in the checkpoint.
         stage: name of the present stage, or "".
-        verdict: reason why the last state is inadmissible, or "" (`State.verdict`).
+        inadmissible_reason: reason why the last state is inadmissible, or "" (`State.inadmissible_reason`).
         target: target of the stage: (column, its value at the target, its present value). None without a target, or if
             the target is a value of no column.
         computing_time: computing time up to the last completed step, s.
@@ -46,7 +46,7 @@ class Status:
 
     states: int
     stage: str
-    verdict: str
+    inadmissible_reason: str
     target: tuple[str, float, float] | None
     computing_time: float
     remaining_time: float | None
@@ -60,7 +60,7 @@ class Status:
     def findings(self) -> list[Finding]:
         """Findings of severity "warning" and "serious" on the last state and, if the run has ended, on the run."""
         ended = [] if self.ended is None else without_notes(self.ended["findings"])
-        state = [Finding("serious", "state", self.verdict)] if self.verdict else []
+        state = [Finding("serious", "state", self.inadmissible_reason)] if self.inadmissible_reason else []
         return state + [finding for finding in ended if not (state and finding.about == "state")]
 
     def __str__(self) -> str:

@@ -60,7 +60,7 @@ class Record:
         script: name of the file of the script, or "".
         findings: findings on the run (`Path.findings`); a checkpoint holds them once the run has ended.
         failure: error message that ended the run, or "".
-        verdicts: reason why each state is inadmissible, or "" (`State.verdict`).
+        inadmissible_reasons: reason why each state is inadmissible, or "" (`State.inadmissible_reason`).
         heat: {tool: (conductance of the contact, temperature of the tool as text)} for tools that conduct heat.
         unit: unit of temperatures, "C" or "K"; "" without heat transfer.
         space: True for a sheet in three dimensions.
@@ -86,7 +86,7 @@ class Record:
     script: str = ""
     findings: Sequence[Finding] = ()
     failure: str = ""
-    verdicts: Sequence[str] = ()
+    inadmissible_reasons: Sequence[str] = ()
     heat: dict[str, tuple[float, str]] = field(default_factory=dict)
     unit: str = ""
     space: bool = False
@@ -162,7 +162,7 @@ class Record:
                                  f"The mass changes by up to {100 * worst:.2g} %"
                                  f"{self._first(np.abs(self.measures['mass_error']) > MASS)}: use a smaller eps or a"
                                  f" finer mesh."))
-        found += [*self._volume_findings(), *self._verdict_findings()]
+        found += [*self._volume_findings(), *self._admissibility_findings()]
         subjects = {finding.about for finding in found}      # these are on all states, `self.findings` on the last one
         found += [finding for finding in self.findings if finding.about not in subjects]
         if self.counts.get("failures", 0) > len(self.kinds):
@@ -220,12 +220,12 @@ class Record:
         clamped = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
         return clamped or volume.findings(errors[k], where)
 
-    def _verdict_findings(self) -> list[Finding]:
+    def _admissibility_findings(self) -> list[Finding]:
         """Return a finding on the first inadmissible state in a list; empty if all states are admissible."""
-        k = next((k for k, verdict in enumerate(self.verdicts) if verdict), None)
+        k = next((k for k, reason in enumerate(self.inadmissible_reasons) if reason), None)
         return [] if k is None else [
             Finding("serious", "state", f"From{self._first(np.arange(len(self.kinds)) >= k)[6:]} the results must not"
-                    f" be used: {self.verdicts[k]}.")]
+                    f" be used: {self.inadmissible_reasons[k]}.")]
 
     def warnings(self) -> list[str]:
         """Return the texts of `all_findings`."""
@@ -267,7 +267,7 @@ def of_path(path: Any) -> Record:
                       target_column(stepping, measures), tooling,
                       [tooling.travels(s.setting, s.control) for s in states],
                       tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
-                      path.findings(), verdicts=[s.verdict for s in states],
+                      path.findings(), inadmissible_reasons=[s.inadmissible_reason for s in states],
                       space=problem.scene.kinematics.components == 3, planes=problem.scene.symmetry,
                       **_heat(plain(problem.scene.heat)))
 
@@ -292,7 +292,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
                   target_column(stepping, measures), tooling,
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
-                  _temperatures(states, profiles[-1]), {}, verdicts=[s["verdict"] for s in states],
+                  _temperatures(states, profiles[-1]), {}, inadmissible_reasons=[s["verdict"] for s in states],
                   space=about["scene"]["kinematics"]["kind"] == "ThreeD",
                   planes=MirrorPlanes.of_description(about["scene"]), **ended, **_heat(about["scene"].get("heat")))
 
