@@ -167,7 +167,7 @@ def count(name: str, value: Any) -> int:
     return int(number)
 
 
-def instance(name: str, value: Any, kind: Any, what: str) -> Any:
+def check_type(name: str, value: Any, kind: Any, what: str) -> Any:
     """Return an argument, which must be of a given type.
 
     Args:
@@ -184,7 +184,7 @@ def instance(name: str, value: Any, kind: Any, what: str) -> Any:
     return value
 
 
-def several(name: str, values: Any, what: str) -> list[Any]:
+def as_list(name: str, values: Any, what: str) -> list[Any]:
     """Return an argument that must be a sequence as a list.
 
     Args:
@@ -257,7 +257,7 @@ def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
     Raises:
         InputError: the argument is not n finite numbers.
     """
-    found = several(name, values, what)
+    found = as_list(name, values, what)
     if len(found) != n:
         raise InputError(f"{name} = {values!r}: must be {what}")
     return [finite(name, value) for value in found]
@@ -345,7 +345,7 @@ def file_path(name: str, value: Any) -> Path:
     return Path(value)
 
 
-def known(kind: str, name: Any, names: Any) -> None:
+def check_name(kind: str, name: Any, names: Any) -> None:
     """Check that a name is one of the known names.
 
     Args:

@@ -6,7 +6,7 @@ import logging
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Literal, NamedTuple, Protocol, TypeVar
 
-from .errors import known
+from .errors import check_name
 
 log = logging.getLogger("formingx")
 
@@ -65,7 +65,7 @@ def register(moment: Moment) -> Callable[[_Check], _Check]:
     Raises:
         InputError: the moment is unknown.
     """
-    known("register: moment", moment, _registered)
+    check_name("register: moment", moment, _registered)
 
     def add(check: _Check) -> _Check:
         """Register a check, and return it unchanged."""

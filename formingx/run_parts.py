@@ -8,7 +8,7 @@ import logging
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from .errors import ConvergenceError, InputError, Interrupted, instance, known
+from .errors import ConvergenceError, InputError, Interrupted, check_name, check_type
 from .findings import Finding, log_findings
 from .measures.columns import Measure
 from .problem.problem import Problem
@@ -53,7 +53,7 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
     options = {} if adapt_mesh is True else dict(adapt_mesh)
     meshes = adaptation(caller)
     for name in options:
-        known(f"{caller}: adapt_mesh", name, ("max_rotation", "error"))
+        check_name(f"{caller}: adapt_mesh", name, ("max_rotation", "error"))
     meshes.check(scene.mesh)
     try:
         first = run(scene, None)
@@ -110,7 +110,7 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
     record = Record(curve.problem, curve)
     record.findings = found
     log_findings(found, curve.problem.comm.rank)
-    record.allow_inadmissible = instance("allow_inadmissible", allow_inadmissible, bool, "True or False")
+    record.allow_inadmissible = check_type("allow_inadmissible", allow_inadmissible, bool, "True or False")
     if isinstance(start, Path):
         record.continue_from(start.record)
     elif start is not None:

@@ -10,7 +10,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from .checks.check import before_run
-from .errors import InputError, count, finite, instance, known, several
+from .errors import InputError, as_list, check_name, check_type, count, finite
 from .measures.columns import Measure
 from .measures.targets import Amplitude, Target
 from .physics.contact import Contact
@@ -88,7 +88,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     >>> len(path.limit_points), round(float(path["pole_height"][-1]), 6)           # through the pressure maximum
     (1, 12.0)
     """
-    instance("trace: scene", scene, Scene, "a formingx.Scene")
+    check_type("trace: scene", scene, Scene, "a formingx.Scene")
     if remesh is not None:
         check_argument("trace", "remesh", remesh, "a formingx.Remesh")
         remesh.check("trace", scene, [*intermediate, until])
@@ -101,18 +101,18 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
                          max_steps=max_steps, progress=progress, checkpoint=checkpoint, record=record,
                          at_limit_point=at_limit_point, allow_inadmissible=allow_inadmissible, stop_at=stop_at)
         return run_on_adapted_mesh("trace", adapt_mesh, start, resume, scene, checkpoint, run)
-    intermediate = several("trace: intermediate", intermediate, "targets, such as pole_stretch(3)")
+    intermediate = as_list("trace: intermediate", intermediate, "targets, such as pole_stretch(3)")
     for target in (until, *intermediate):
-        instance("trace: target", target, Target, "a target, such as pole_stretch(3)")
+        check_type("trace: target", target, Target, "a target, such as pole_stretch(3)")
         if target.name == "travel" and isinstance(scene.driven, Contact):
             scene.check_travel(scene.driven, target.value)
-    instance("trace: step", step, StepControl | None, "a StepControl or None")
-    instance("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-    instance("trace: progress", progress, bool, "True or False")
+    check_type("trace: step", step, StepControl | None, "a StepControl or None")
+    check_type("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+    check_type("trace: progress", progress, bool, "True or False")
     if stop_at is not None:
         check_argument("trace", "stop_at", stop_at, "fx.instability(modes=...) or None")
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
-    known("trace: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
+    check_name("trace: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
     scene.only_driven("trace")
     target_checks.check(scene, [until, *intermediate])
     if start is not None and (not isinstance(start, Path) or start.scene is not scene or not start.states):
@@ -164,8 +164,8 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
     >>> round(float(path["pressure"][-1]), 6)
     0.02
     """
-    instance("solve: scene", scene, Scene, "a formingx.Scene")
-    instance("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+    check_type("solve: scene", scene, Scene, "a formingx.Scene")
+    check_type("solve: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     scene.only_driven("solve")
     to, increments = finite("solve: to", to), count("solve: increments", increments)
     max_steps = count("solve: max_steps", max_steps)
@@ -206,7 +206,7 @@ class Process:
     """
 
     def __init__(self, scene: Scene):
-        self.scene = instance("Process: scene", scene, Scene, "a formingx.Scene")
+        self.scene = check_type("Process: scene", scene, Scene, "a formingx.Scene")
 
     def run(self, stages: Sequence[Stage], *, step: StepControl | None = None, tolerances: Tolerances | None = None,
             max_steps: int | None = None, progress: bool = True, start: Path | State | None = None,
@@ -256,10 +256,10 @@ class Process:
                                           progress=progress, checkpoint=checkpoint, record=record, accuracy=accuracy,
                                           allow_inadmissible=allow_inadmissible)
             return run_on_adapted_mesh("Process", adapt_mesh, start, resume, self.scene, checkpoint, run)
-        instance("Process: step", step, StepControl | None, "a StepControl or None")
-        instance("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
-        instance("Process: progress", progress, bool, "True or False")
-        instance("Process: start", start, Path | State | None, "a path, a state or None")
+        check_type("Process: step", step, StepControl | None, "a StepControl or None")
+        check_type("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
+        check_type("Process: progress", progress, bool, "True or False")
+        check_type("Process: start", start, Path | State | None, "a path, a state or None")
         allowed = allowed_error("Process", accuracy)
         plans = [plan(self.scene, stage) for stage in stages]
         uncertain = clearance.check(self.scene, plans)
@@ -307,12 +307,12 @@ class Process:
         Raises:
             InputError: there is no stage, or two have the same name.
         """
-        stages = several("Process: stages", stages,
+        stages = as_list("Process: stages", stages,
                          "stages, such as Stage('vacuum', control=vacuum, until=pressure(1))")
         if not stages:
             raise InputError("Process: stages = []: must have at least one Stage")
         for stage in stages:
-            instance("Process: stage", stage, Stage, "a formingx.Stage")
+            check_type("Process: stage", stage, Stage, "a formingx.Stage")
         for stage in stages:
             if sum(other.name == stage.name for other in stages) > 1:
                 raise InputError(f"Process: two stages are called {stage.name!r}: names must differ")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any
 
-from .errors import InputError, finite, known
+from .errors import InputError, check_name, finite
 
 # lengths in m, stresses in Pa; kg/cm2 is the technical atmosphere of the older literature (kgf/cm2)
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
@@ -44,7 +44,7 @@ class Units:
     def __post_init__(self) -> None:
         for kind, unit, names in (("length", self.length, LENGTHS), ("stress", self.stress, STRESSES)):
             if unit is not None:
-                known(f"Units: {kind}", unit, names)
+                check_name(f"Units: {kind}", unit, names)
         if not isinstance(self.time, str):
             raise InputError(f"Units: time = {self.time!r}: must be a word, such as 's'")
 

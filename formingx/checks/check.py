@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from ..errors import instance, several
+from ..errors import as_list, check_type
 from ..findings import Finding, findings_at, without_notes, worst_first
 from ..measures.targets import Target
 from ..results.path import Path
@@ -79,14 +79,14 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
                     for left, right in scene.branch_points]
         before = check(scene.problem.scene, targets=targets, stages=stages, units=units).findings
         return Report([*without_notes(scene.findings()), *branches, *before])
-    instance("check: scene", scene, Scene, "a formingx.Scene, or the Path of a run")
-    instance("check: units", units, Units, "a formingx.Units")
-    targets = several("check: targets", targets, "targets, such as [pole_stretch(3)]")
-    stages = several("check: stages", stages, "stages, such as [Stage('blow', control='air', until=pressure(1))]")
+    check_type("check: scene", scene, Scene, "a formingx.Scene, or the Path of a run")
+    check_type("check: units", units, Units, "a formingx.Units")
+    targets = as_list("check: targets", targets, "targets, such as [pole_stretch(3)]")
+    stages = as_list("check: stages", stages, "stages, such as [Stage('blow', control='air', until=pressure(1))]")
     for target in targets:
-        instance("check: targets: target", target, Target, "a target, such as pole_stretch(3)")
+        check_type("check: targets: target", target, Target, "a target, such as pole_stretch(3)")
     for stage in stages:
-        instance("check: stages: stage", stage, Stage, "a formingx.Stage")
+        check_type("check: stages: stage", stage, Stage, "a formingx.Stage")
     body = Body(scene, targets, stages, units)
     return Report([*findings_at("scene", body), *findings_at("start", body)])
 

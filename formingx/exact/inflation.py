@@ -45,7 +45,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, known, non_negative, positive
+from ..errors import InputError, check_name, non_negative, positive
 
 
 @dataclass(frozen=True)
@@ -325,7 +325,7 @@ def thick_wall(kind: str, inner_stretch: float, *, inner_radius: float, outer_ra
     >>> round(float(state.pressure), 4)
     1.6139
     """
-    known("thick_wall: kind", kind, ("tube", "sphere"))
+    check_name("thick_wall: kind", kind, ("tube", "sphere"))
     A, B = positive("inner_radius", inner_radius), positive("outer_radius", outer_radius)
     if not A < B:
         raise InputError(f"outer_radius = {outer_radius!r}: must be above inner_radius = {inner_radius!r}")

@@ -40,7 +40,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, known, non_negative, positive
+from ..errors import InputError, check_name, non_negative, positive
 from .inflation import meridional_stretch
 
 
@@ -101,7 +101,7 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
     from scipy.optimize import brentq
     travel, radius, thickness = positive("travel", travel), positive("radius", radius), positive("thickness", thickness)
     c10, c01, edge = positive("c10", c10), non_negative("c01", c01), positive("plug_radius", plug_radius) / radius
-    known("membrane_under_plug: friction", friction, ("stick", "none"))
+    check_name("membrane_under_plug: friction", friction, ("stick", "none"))
     if edge >= 1:
         raise InputError(f"plug_radius = {plug_radius!r}: must be below radius = {radius!r}")
     k, depth, slides = c01 / c10, travel / radius, friction == "none"

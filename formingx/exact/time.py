@@ -33,7 +33,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, known, non_negative, positive
+from ..errors import InputError, check_name, non_negative, positive
 from ..materials.homogeneous import MODES
 from ..materials.viscoelastic import Viscoelastic
 
@@ -242,7 +242,7 @@ def block(mode: str, *, c10: float, branches: Any) -> Body:
         c10: neo-Hookean constant of the equilibrium, stress.
         branches: (shear modulus, relaxation time) of each branch, stress and time.
     """
-    known("block: mode", mode, MODES)
+    check_name("block: mode", mode, MODES)
     k = MODES[mode]
     return Body(c10, branches, np.array([1, k, -1 - k]), lambda s: (np.array([s]), np.ones(1)),
                 lambda s: (np.array([math.exp(-s)]), np.array([-math.exp(-s)])))
@@ -267,7 +267,7 @@ def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, bra
     Raises:
         InputError: a size or constant is not allowed.
     """
-    known("wall: kind", kind, ("tube", "sphere"))
+    check_name("wall: kind", kind, ("tube", "sphere"))
     A, B, n = positive("inner_radius", inner_radius), positive("outer_radius", outer_radius), 2 if kind == "tube" else 3
     if not A < B:
         raise InputError(f"outer_radius = {outer_radius!r}: must be above inner_radius = {inner_radius!r}")

@@ -9,7 +9,7 @@ import ufl
 from dolfinx import fem, la
 
 from .. import _compat
-from ..errors import InputError, known
+from ..errors import InputError, check_name
 
 
 class Face(NamedTuple):
@@ -69,7 +69,7 @@ class LoadedBody:
         """
         layers = self._forms.mesh.layers
         if layer is not None:
-            known("body.integral: layer", layer, layers)
+            check_name("body.integral: layer", layer, layers)
         return self._forms.weighted(integrand, list(layers) if layer is None else [layer])
 
     def face(self, on: str, quadrature_degree: int = 5) -> Face:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, file_path, known, positive
+from ..errors import InputError, check_name, file_path, positive
 from ..units import LENGTHS, STRESSES
 from .numerals import is_number
 
@@ -48,7 +48,7 @@ class Table(NamedTuple):
             InputError: there is no such column, or a cell is empty or not a finite number. A unit is unknown, is
                 missing in the header, or stands there although `requested` is None.
         """
-        known(f"{self.name}: column", column, self.columns)
+        check_name(f"{self.name}: column", column, self.columns)
         values, unit = self.columns[column], self.units[column]
         if not np.all(np.isfinite(values)):
             row = int(np.argmin(np.isfinite(values))) + 1

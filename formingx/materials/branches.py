@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError, known
+from ..errors import ConvergenceError, InputError, check_name
 from .homogeneous import MODES
 
 BETWEEN = ("stretch", "strain")
@@ -49,7 +49,7 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
         ConvergenceError: the integration stopped before the last time.
     """
     from scipy.integrate import solve_ivp
-    known("elastic_strains: mode", mode, MODES)
+    check_name("elastic_strains: mode", mode, MODES)
     direction = np.array([1, MODES[mode], -1 - MODES[mode]])
     strain, tau = np.log(stretches), np.asarray(tau, float)[:, None]
     w = np.empty((len(times), len(tau), 3))
@@ -90,8 +90,8 @@ def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> t
     Raises:
         InputError: an unknown mode or `between`, different shapes, descending times, or a stretch that is not positive.
     """
-    known(f"{name}: mode", mode, MODES)
-    known(f"{name}: between", between, BETWEEN)
+    check_name(f"{name}: mode", mode, MODES)
+    check_name(f"{name}: between", between, BETWEEN)
     try:
         t, l = np.asarray(times, float), np.asarray(stretches, float)
     except (TypeError, ValueError):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, file_path, positive, several
+from ..errors import InputError, as_list, file_path, positive
 from ..figures import figure
 from .constants import OfTemperature
 from .homogeneous import MODES
@@ -41,12 +41,12 @@ def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequen
     """
     caller, path = f"{material}: report", file_path("report: file", file)
     depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
-    values = several(f"{caller}: temperatures", temperatures, "temperatures")
+    values = as_list(f"{caller}: temperatures", temperatures, "temperatures")
     if depends and not values:
         raise InputError(f"{caller}: {', '.join(depends)} depend on the temperature: give temperatures=[...]")
     cases = [(f"{T:g}", material.at_temperature(T), _shift(material, T)) for T in values] if depends else [
         ("", material, 1.0)]
-    rates = [positive(f"{caller}: rates", rate) for rate in several(f"{caller}: rates", rates, "rates")]
+    rates = [positive(f"{caller}: rates", rate) for rate in as_list(f"{caller}: rates", rates, "rates")]
     parts = [_limits(name, entry, shift, unit, unit_of_time) for name, entry, shift in cases]
     picture = _picture(cases, rates if material.equilibrium is not material else [], unit, unit_of_time)
     if material.tested is not None:

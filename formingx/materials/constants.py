@@ -17,7 +17,7 @@ import numpy as np
 import ufl
 
 from .. import _compat
-from ..errors import InputError, finite, known, values
+from ..errors import InputError, check_name, finite, values
 from ..mesh.nodes import axes
 from ..values.table import Table
 from ..values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
@@ -164,7 +164,7 @@ def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
     2.0
     """
     value, reference = finite("entropic: value", value), finite("entropic: reference", reference)
-    known("entropic: unit", unit, ABSOLUTE_ZERO)
+    check_name("entropic: unit", unit, ABSOLUTE_ZERO)
     zero = ABSOLUTE_ZERO[unit]
     if not reference > zero:
         raise InputError(f"entropic: reference = {reference!r}: must be above {zero:g}, absolute zero")

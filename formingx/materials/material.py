@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, finite, known, positive
+from ..errors import InputError, check_name, finite, positive
 from ..figures import Axes, figure
 from . import homogeneous
 from .constants import OfTemperature, Sample, Varying, varying
@@ -172,7 +172,7 @@ class Material(Energies):
         Raises:
             InputError: an unknown mode, or a stretch that is not positive or beyond the limit of the material.
         """
-        known(f"{self}: stress: mode", mode, [*MODES, "biaxial"])
+        check_name(f"{self}: stress: mode", mode, [*MODES, "biaxial"])
         l = np.asarray(stretches, dtype=float)
         if mode == "biaxial" and l.shape[:1] != (2,):
             raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), the shape is {l.shape}")
@@ -201,7 +201,7 @@ class Material(Energies):
         Returns:
             The stretch, above 1; infinity if the energy is finite for all stretches.
         """
-        known(f"{self}: largest_stretch: mode", mode, MODES)
+        check_name(f"{self}: largest_stretch: mode", mode, MODES)
         if not math.isfinite(self.largest_I1):
             return math.inf
         from scipy.optimize import brentq

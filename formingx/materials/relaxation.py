@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, finite_array, instance, positive, several
+from ..errors import InputError, as_list, check_type, finite_array, positive
 from .material import Material
 
 
@@ -43,10 +43,10 @@ def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
     Raises:
         InputError: `pairs` is empty, or an entry is not a pair.
     """
-    found = several(name, pairs, f"({what})")
+    found = as_list(name, pairs, f"({what})")
     if not found:
         raise InputError(f"{name} = {pairs!r}: must be at least one ({what})")
-    found = [several(f"{name}: number {k}", pair, what.replace(",", " and")) for k, pair in enumerate(found, 1)]
+    found = [as_list(f"{name}: number {k}", pair, what.replace(",", " and")) for k, pair in enumerate(found, 1)]
     for k, pair in enumerate(found, 1):
         if len(pair) != 2:
             raise InputError(f"{name}: number {k} is {tuple(pair)!r}: must be ({what})")
@@ -72,7 +72,7 @@ class RelaxingMaterial(Material):
     def __init__(self, equilibrium: Material | None):
         name = type(self).__name__
         if equilibrium is not None:
-            instance(f"{name}: equilibrium", equilibrium, Material, "a material, or None")
+            check_type(f"{name}: equilibrium", equilibrium, Material, "a material, or None")
             if equilibrium.internal or equilibrium.integral:
                 raise InputError(f"{name}: equilibrium = {equilibrium}: must not relax itself, nor remember anything:"
                                  f" give all branches here")

@@ -22,7 +22,7 @@ import numpy as np
 import ufl
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, known, positive
+from ..errors import InputError, check_name, positive
 from ..figures import Axes, figure
 from ..physics import kinematics
 from . import branches as tests
@@ -296,7 +296,7 @@ class GeneralisedMaxwell(RelaxingMaterial):
         Returns:
             The matplotlib axes.
         """
-        known(f"{self}: plot: mode", mode, MODES)
+        check_name(f"{self}: plot: mode", mode, MODES)
         drawn: Any = figure()[1] if axes is None else axes
         l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else np.asarray(
             stretches, dtype=float)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..errors import InputError, finite, instance, positive, several
+from ..errors import InputError, as_list, check_type, finite, positive
 from ..values.table import Table
 from .constants import OfTemperature, Sample
 from .material import Material, brief
@@ -45,7 +45,7 @@ class Solidification(Material):
     """
 
     def __init__(self, base: Material, modulus: float, between: Any = None, fraction: Table | None = None):
-        instance("Solidification: base", base, Material, "a material")
+        check_type("Solidification: base", base, Material, "a material")
         if isinstance(base, Solidification):
             raise InputError(f"Solidification: base = {base}: solidifies already: give its base, with one fraction")
         self._base, self._phi = base, _fraction(between, fraction)
@@ -243,11 +243,11 @@ def _fraction(between: Any, table: Any) -> _Fraction:
                          f" temperatures between=(75, 85) at which all and nothing has solidified, or a table of the"
                          f" fraction over temperature")
     if table is not None:
-        y = instance("Solidification: fraction", table, Table, "a table, such as table({75: 1, 80: 0.7, 85: 0})").y
+        y = check_type("Solidification: fraction", table, Table, "a table, such as table({75: 1, 80: 0.7, 85: 0})").y
         if np.any(np.diff(y) > 0) or abs(y[0] - 1) > 1e-12 or abs(y[-1]) > 1e-12:
             raise InputError(f"Solidification: fraction = {table!r}: must fall from 1 to 0 as the temperature rises")
         return _Fraction(table.x[0], table.x[-1], table)
-    ends = several("Solidification: between", between, "two temperatures")
+    ends = as_list("Solidification: between", between, "two temperatures")
     if len(ends) != 2 or finite("Solidification: between", ends[0]) >= finite("Solidification: between", ends[1]):
         raise InputError(f"Solidification: between = {between!r}: must be two temperatures, the lower first, as"
                          f" (75, 85)")

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import ufl
 
-from ..errors import known
+from ..errors import check_name
 from .material import Material
 from .relaxing import GeneralisedMaxwell
 from .tensors import cofactor, determinant, deviator_squared, entries, inner, plus
@@ -59,7 +59,7 @@ class Viscoelastic(GeneralisedMaxwell):
     _tensor = "Cv"
 
     def __init__(self, equilibrium: Material | None, branches: Any, order: int = 2, shift: Any = None):
-        known("Viscoelastic: order", order, (1, 2))
+        check_name("Viscoelastic: order", order, (1, 2))
         self._stores_C = order == 2
         super().__init__(equilibrium, branches, shift)
 

@@ -7,7 +7,7 @@ import ufl
 from dolfinx import fem
 
 from ..contact import resultants
-from ..errors import InputError, finite, known
+from ..errors import InputError, check_name, finite
 from .quantities import Quantity, WholePartQuantity
 from .targets import Target
 
@@ -84,7 +84,7 @@ def force(value: float, *, of: str | None = None) -> Target:
         scene = problem.scene
         found = {i: t for i, t in enumerate(scene.items) if t in scene.drivable and t.quantity == "travel"}
         if of is not None:
-            known("force: of =", of, [t.name for t in found.values() if t.name])
+            check_name("force: of =", of, [t.name for t in found.values() if t.name])
             found = {i: t for i, t in found.items() if t.name == of}
         moving = {i: t for i, t in found.items() if problem.setting.rate[i]} or found
         if len(moving) != 1:

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 
-from ..errors import InputError, finite, known, pair, positive
+from ..errors import InputError, check_name, finite, pair, positive
 from ..forms.probes import probe
 from .quantities import Form, Linear, Quantity, Sag, WholePartQuantity
 
@@ -176,7 +176,7 @@ def _driven(quantity: str, value: float, of: str | None) -> Target:
         found = [i for i, t in enumerate(scene.items)
                  if any(t is d for d in scene.drivable) and t.quantity == quantity]
         if of is not None:
-            known(f"{quantity}: of =", of, [n for n in (scene.items[i].name for i in found) if n])
+            check_name(f"{quantity}: of =", of, [n for n in (scene.items[i].name for i in found) if n])
             return Amplitude(problem, next(i for i in found if scene.items[i].name == of))
         moving = [i for i in found if rate[i]] or found
         if len(moving) != 1:
@@ -273,7 +273,7 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
 
     def bind(problem):
         axes = problem.scene.kinematics.axes
-        known("displacement: component", component, axes)
+        check_name("displacement: component", component, axes)
         return _displacement(problem, [at], [[float(axis == component) for axis in axes]])
     return Target(f"u_{component}_at_{at[0]:g}_{at[1]:g}", finite("displacement", value), bind)
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError, as_points, count, finite, known, non_negative, positive
+from ..errors import InputError, as_points, check_name, count, finite, non_negative, positive
 from .divisions import (
     Thickness,
     checked_grading,
@@ -82,7 +82,7 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
     if inner_radius >= radius:
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
-    known("disc: accuracy", accuracy, ACCURACY)
+    check_name("disc: accuracy", accuracy, ACCURACY)
     layers = layer_thicknesses("disc", thickness, "sheet", "R")
     chosen = elements is None and concentrate is None and grading == 1
     if elements is None:
@@ -270,7 +270,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     grading = checked_grading("parison", grading)
     layers = layer_thicknesses("parison", thickness, "wall", "Z")
     if accuracy is not None:
-        known("parison: accuracy", accuracy, ACCURACY)
+        check_name("parison: accuracy", accuracy, ACCURACY)
     chosen = accuracy is not None and elements is None and grading == 1
     along, through = divisions("parison", "meridian", (60, 2) if elements is None else elements, len(layers))
     if along < 2:

@@ -10,7 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from .. import _compat
-from ..errors import InputError, known, pair
+from ..errors import InputError, check_name, pair
 from ..ranks import gathered
 from .check import check_elements
 from .nodes import facet_node_positions, facet_nodes, own_cells
@@ -114,7 +114,7 @@ class Mesh:
         Args:
             boundary: name of the boundary.
         """
-        known("Mesh: boundary", boundary, self.boundaries)
+        check_name("Mesh: boundary", boundary, self.boundaries)
         return np.sort(np.concatenate([self.facets.find(tag) for tag in self.boundaries[boundary]]))
 
     def with_part(self, name: str, of: str, within: tuple[float, float], along: str = "r") -> Mesh:
@@ -140,8 +140,8 @@ class Mesh:
         if not isinstance(name, str) or not name or name in self.boundaries:
             raise InputError(f"{caller}: name = {name!r}: must be a word that no boundary has yet; there are"
                              f" {', '.join(map(repr, self.boundaries))}")
-        known(f"{caller}: boundary", of, self.boundaries)
-        known(f"{caller}: along", along, ("r", "z"))
+        check_name(f"{caller}: boundary", of, self.boundaries)
+        check_name(f"{caller}: along", along, ("r", "z"))
         low, high = pair(f"{caller}: within", within)
         if not low < high:
             raise InputError(f"{caller}: within = {within!r}: the first must be below the second")

@@ -35,7 +35,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, count, instance, pair, positive, triple
+from ..errors import InputError, check_type, count, pair, positive, triple
 from ..values.temperature import FunctionOfTemperature
 from .contact_arguments import coefficient, contact_points
 from .contact_law import ContactLaw
@@ -113,11 +113,11 @@ class Contact(Part):
         self.name, name = name, f"Contact({on!r})"
         if isinstance(tool, type) or not hasattr(tool, "signed_distance"):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
-        self.on, self.tool, self.friction = instance("Contact: on", on, str, "the name of a boundary"), tool, friction
+        self.on, self.tool, self.friction = check_type("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = coefficient(f"{name}: friction", friction)
         three_d = self.lagged
         usually = not three_d or not self.sticks
-        self.separates = instance(f"{name}: separates", usually if separates is None else separates, bool,
+        self.separates = check_type(f"{name}: separates", usually if separates is None else separates, bool,
                                   "True or False")
         usual = _BONDED if three_d or not self.separates else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
@@ -128,7 +128,7 @@ class Contact(Part):
                              f" no Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = None if nodes_per_step is None else count(f"{name}: nodes_per_step", nodes_per_step)
         self.points = contact_points(f"{name}: points", points)
-        self.present_area = instance(f"{name}: present_area", present_area, bool, "True or False")
+        self.present_area = check_type(f"{name}: present_area", present_area, bool, "True or False")
         if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):
             raise InputError(f"{name}: friction = {friction!r}, separates = {self.separates!r} with present_area=True:"
                              f" the traction of a sticking or bonded point would change with its penalty; use 'none',"

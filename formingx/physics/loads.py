@@ -7,7 +7,7 @@ from typing import Any
 
 import ufl
 
-from ..errors import InputError, finite, instance, positive
+from ..errors import InputError, check_type, finite, positive
 from .kinematics import cofactor_change
 from .part import Part
 
@@ -107,7 +107,7 @@ class Pressure(Load):
     quantity = "pressure"
 
     def __init__(self, on: str, value: float | None = None, name: str | None = None):
-        super().__init__(instance("Pressure: on", on, str, "the name of a boundary"), value, name)
+        super().__init__(check_type("Pressure: on", on, str, "the name of a boundary"), value, name)
 
     def virtual_work(self, body, value):
         face = body.face(self.on, self.quadrature_degree)

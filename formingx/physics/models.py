@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, instance, known, non_negative, positive
+from ..errors import InputError, check_name, check_type, finite, non_negative, positive
 from ..mesh.triangles import Place, Triangles
 
 _SLENDER_TRIANGLE = 3.0                                # slenderness of triangles that can do harm
@@ -196,7 +196,7 @@ class MixedPressure(Model):
         self.eps = non_negative("MixedPressure: eps", eps)
         if self.eps > 1:
             raise InputError(f"MixedPressure: eps = {eps!r}: must be at most 1 (thesis: 2e-2 to 1e-7)")
-        known("MixedPressure: space", space, _SPACES)
+        check_name("MixedPressure: space", space, _SPACES)
         self.volume_stiffness = non_negative("MixedPressure: volume_stiffness", volume_stiffness)
         self.space, self.pressure = space, _SPACES[space]
 
@@ -278,7 +278,7 @@ class DisplacementPenalty(Model):
     pressure = None
 
     def __init__(self, *, eps: float = 1e-3, points: int = 3, stress_free: bool = True):
-        self.stress_free = instance("DisplacementPenalty: stress_free", stress_free, bool, "True or False")
+        self.stress_free = check_type("DisplacementPenalty: stress_free", stress_free, bool, "True or False")
         self.eps = positive("DisplacementPenalty: eps", eps)
         finite("DisplacementPenalty: points", points)
         if points not in _RULES:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from ..errors import InputError, finite, instance
+from ..errors import InputError, check_type, finite
 from .part import Part
 
 R, Z = 0, 1
@@ -64,7 +64,7 @@ class Support(Part):
     resists: tuple[str, ...] = ()
 
     def __init__(self, on: str):
-        self.on = instance(f"{type(self).__name__}: on", on, str, "the name of a boundary")
+        self.on = check_type(f"{type(self).__name__}: on", on, str, "the name of a boundary")
 
     def stored_energy(self, body: Any) -> Any:
         """Return the energy of an elastic support, whose derivative by the displacement enters the residual.
@@ -130,8 +130,8 @@ class Symmetry(_OneComponent):
 
     def __init__(self, on: str, normal: str = "r", mirror: bool = False, guide: bool = False):
         super().__init__(on, "normal", normal)
-        self.mirror = instance(f"Symmetry({on!r}): mirror", mirror, bool, "True or False")
-        if instance(f"Symmetry({on!r}): guide", guide, bool, "True or False"):
+        self.mirror = check_type(f"Symmetry({on!r}): mirror", mirror, bool, "True or False")
+        if check_type(f"Symmetry({on!r}): guide", guide, bool, "True or False"):
             if mirror:
                 raise InputError(f"Symmetry({on!r}): mirror = True, guide = True: must be one of them: behind a mirror"
                                  " the body goes on, at a guide it ends")

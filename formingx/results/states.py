@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ConvergenceError, InputError, finite, known
+from ..errors import ConvergenceError, InputError, check_name, finite
 from ..measures import columns as standard_columns
 from ..measures.quantities import Quantity
 from ..measures.targets import Target, is_met, process_time
@@ -193,7 +193,7 @@ class States:
             if stages == [""]:
                 raise InputError(f"Path.state: stage {stage!r}: the run has no stages; its states by number are"
                                  f" Path.states[k]")
-            known("Path.state: stage", stage, stages)
+            check_name("Path.state: stage", stage, stages)
         candidates = [state for state in self.states if stage in (None, state.stage)]
         if time is None:
             return candidates[-1]

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..errors import InputError, call_on_all_ranks, count, known, several
+from ..errors import InputError, as_list, call_on_all_ranks, check_name, count
 from ..materials.constants import OfMesh, Sample
 from ..materials.hyperelastic import Material
 from ..mesh.contact_columns import for_contacts
@@ -335,7 +335,7 @@ class Scene:
         """Raise an InputError unless each layer has a valid material; store the shear moduli of the layers."""
         layers = self.mesh.layers
         for name, material in self.materials.items():
-            known("Scene: materials: layer", name, layers)
+            check_name("Scene: materials: layer", name, layers)
             if not isinstance(material, Material):
                 raise InputError(f"Scene: materials[{name!r}] = {material!r}: must be a formingx material")
         missing = [name for name in layers if name not in self.materials]
@@ -369,7 +369,7 @@ class Scene:
         if self.temperature is None:
             raise InputError("Scene: expansion: depends on the temperature: give Scene a temperature=...")
         for layer, law in laws.items():
-            known("Scene: expansion: layer", layer, self.mesh.layers)
+            check_name("Scene: expansion: layer", layer, self.mesh.layers)
             T: Any = sample(self.mesh, layer, self.quadrature_degree, self.temperature).temperature
             call_on_all_ranks(self.mesh.comm, [partial(law.stretch, T)])
         return dict(laws)
@@ -383,7 +383,7 @@ class Scene:
         Returns:
             The points, the cells that contain them, and the temperatures.
         """
-        known("Scene.sample: layer", layer, self.mesh.layers)
+        check_name("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
         if self.preformed is None:
             return found
@@ -398,7 +398,7 @@ class Scene:
         Returns:
             Modulus, stress; for constants that vary over the body the largest one of all ranks.
         """
-        known("Scene: layer", layer, self._moduli)
+        check_name("Scene: layer", layer, self._moduli)
         return self._moduli[layer]
 
     def _check_boundaries(self) -> None:
@@ -407,7 +407,7 @@ class Scene:
             on = item.on
             if on is None:
                 continue
-            known(f"{item!r}: boundary", on, self.mesh.boundaries)
+            check_name(f"{item!r}: boundary", on, self.mesh.boundaries)
             if self.mesh.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
                 raise InputError(f"{item!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
@@ -439,7 +439,7 @@ def _checked_items(kind: type, name: str, scene_items: Any, what: str) -> list[A
 
     `name` is the name of the argument, `what` describes its entries in the message.
     """
-    scene_items = several(f"Scene: {name}", scene_items, what)
+    scene_items = as_list(f"Scene: {name}", scene_items, what)
     for item in scene_items:
         if not isinstance(item, kind):
             raise InputError(f"Scene: {name}: {item!r} is not allowed here: must be a list of {what}")

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError, finite, instance, known, positive, several
+from ..errors import InputError, as_list, check_name, check_type, finite, positive
 from ..measures.targets import Target
 from ..scene import target_checks
 from ..scene.scene import Scene
@@ -68,16 +68,16 @@ class Stage:
             raise InputError(f"Stage: name = {name!r}: must be a word")
         caller = self.label = f"Stage {name!r}"
         self.name, self.control, self.until = name, control, until
-        self.intermediate = several(f"{caller}: intermediate", intermediate, "targets, such as pole_stretch(3)")
-        self.inactive = several(f"{caller}: inactive", inactive, "items of the scene")
-        known(f"{caller}: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
+        self.intermediate = as_list(f"{caller}: intermediate", intermediate, "targets, such as pole_stretch(3)")
+        self.inactive = as_list(f"{caller}: inactive", inactive, "items of the scene")
+        check_name(f"{caller}: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
         self.at_limit_point = at_limit_point
-        self.step = instance(f"{caller}: step", step, StepControl | None, "a StepControl or None")
+        self.step = check_type(f"{caller}: step", step, StepControl | None, "a StepControl or None")
         for target in (*([] if until is None else [until]), *self.intermediate):
-            instance(f"{caller}: target", target, Target, "a target, such as pole_stretch(3)")
+            check_type(f"{caller}: target", target, Target, "a target, such as pole_stretch(3)")
         self.speed = None if speed is None else positive(f"{caller}: speed", speed)
         self.duration = None if duration is None else positive(f"{caller}: duration", duration)
-        self.constant = instance(f"{caller}: constant", constant, Target | None,
+        self.constant = check_type(f"{caller}: constant", constant, Target | None,
                                  "a target, such as force(2.0), or None")
         self.prescribed: tuple[Any, Any] | None = None
         if control is not None and amplitudes is not None:
@@ -162,7 +162,7 @@ class Stage:
             if len(amplitude) < 2:
                 raise InputError(f"{self.label}: the table of {make_target!r} must have two points at least")
         first = amplitude(0.0) if callable(amplitude) else amplitude[0, 1]
-        instance(f"{self.label}: amplitudes", make_target(finite(f"{self.label}: amplitudes: value", first)), Target,
+        check_type(f"{self.label}: amplitudes", make_target(finite(f"{self.label}: amplitudes: value", first)), Target,
                  "made by its measure")
         return make_target, amplitude
 
@@ -183,7 +183,7 @@ class Stage:
         tables = []
         for item, knots in amplitudes.items():
             table = f"{self.label}: the table of {item!r}"
-            rows = [several(table, row, "two numbers") for row in several(table, knots, "(time, value)")]
+            rows = [as_list(table, row, "two numbers") for row in as_list(table, knots, "(time, value)")]
             if not rows or any(len(row) != 2 for row in rows):
                 raise InputError(f"{table}: must be [(time, value), ...]")
             numbers = [(finite(f"{table}: time", t), finite(f"{table}: value", v)) for t, v in rows]

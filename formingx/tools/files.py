@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, count, file_path, finite, known, pair, positive, several
+from ..errors import InputError, as_list, check_name, count, file_path, finite, pair, positive
 from ..mesh import msh
 from ..units import LENGTHS, Units
 from . import cad, dxf, geo
@@ -56,7 +56,7 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
     Tool(2 lines from (0, 2) to (9, 0))
     """
     name = os.fspath(file_path("tools.read: file", file))
-    tags = None if curves is None else [_tag(t) for t in several("tools.read: curves", curves, "numbers of curves")]
+    tags = None if curves is None else [_tag(t) for t in as_list("tools.read: curves", curves, "numbers of curves")]
     if tags == []:
         raise InputError("tools.read: curves = []: must name at least one curve")
     if tolerance is not None:
@@ -183,7 +183,7 @@ def _factor(units: Any, kind: str, file: str) -> float:
     units = units.length if isinstance(units, Units) else units
     if not isinstance(units, str):
         return positive("tools.read: units (of length, or a factor)", units)
-    known("tools.read: units", units, LENGTHS)
+    check_name("tools.read: units", units, LENGTHS)
     own_unit = {"step": "mm", "dxf": dxf.unit(file) if kind == "dxf" else None}.get(kind)
     if own_unit is None:
         raise InputError(f"tools.read: units = {units!r}: tool file {file!r} does not state its own: give a factor")

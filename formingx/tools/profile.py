@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .._jit import address
-from ..errors import InputError, as_points, finite, instance, non_negative, pair, several
+from ..errors import InputError, as_list, as_points, check_type, finite, non_negative, pair
 from ..mesh.boxes import overlapping
 from .nearest import nearest
 from .pieces import FLAT, TURN, Arc, Line, checked, number_of_chords, rounded, sampled, text, turn_angle
@@ -66,8 +66,8 @@ class Tool:
     components = 2
 
     def __init__(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0, closed: bool = False):
-        instance("Tool: closed", closed, bool, "True or False")
-        corners = np.array([pair("Tool: points", p) for p in several("Tool: points", points, "points (R, Z)")])
+        check_type("Tool: closed", closed, bool, "True or False")
+        corners = np.array([pair("Tool: points", p) for p in as_list("Tool: points", points, "points (R, Z)")])
         if len(corners) < (3 if closed else 2):
             raise InputError(f"Tool: {len(corners)} points: a{' closed' if closed else 'n open'} profile needs at least"
                              f" {3 if closed else 2}")
@@ -97,8 +97,8 @@ class Tool:
                 the profile doubles back or crosses itself.
         """
         tool = cls.__new__(cls)
-        instance("Tool.of_pieces: closed", closed, bool, "True or False")
-        tool._set_pieces(several("Tool.of_pieces: pieces", pieces, "Line(...) and Arc(...)"), closed)
+        check_type("Tool.of_pieces: closed", closed, bool, "True or False")
+        tool._set_pieces(as_list("Tool.of_pieces: pieces", pieces, "Line(...) and Arc(...)"), closed)
         return tool
 
     def _set_pieces(self, pieces: list[Line | Arc], closed: bool) -> None:

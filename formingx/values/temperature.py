@@ -7,7 +7,7 @@ import numpy as np
 import ufl
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, finite, known, positive, values
+from ..errors import InputError, check_name, finite, positive, values
 from .table import Table
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
@@ -131,7 +131,7 @@ class Arrhenius:
     """
 
     def __init__(self, activation_energy: float, reference: float, *, unit: str):
-        known("Arrhenius: unit", unit, ABSOLUTE_ZERO)
+        check_name("Arrhenius: unit", unit, ABSOLUTE_ZERO)
         self.activation_energy, self.unit = positive("Arrhenius: activation_energy", activation_energy), unit
         self.reference = finite("Arrhenius: reference", reference)
         _difference(self, self.reference, ABSOLUTE_ZERO[unit], "absolute zero")

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, instance, known, several
+from ...errors import InputError, as_list, check_name, check_type
 from ...io import csv_files
 from ...results import files
 from ...results.show import plots
@@ -181,9 +181,9 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     """
     left, right = _table("compare: ours", ours), _table("compare: theirs", theirs)
     pairs = _columns(left, right, columns)
-    units = instance("compare: units", {} if units is None else units, Mapping, "{our name: factor or unit}")
+    units = check_type("compare: units", {} if units is None else units, Mapping, "{our name: factor or unit}")
     for name in units:
-        known("compare: units: column", name, pairs)
+        check_name("compare: units: column", name, pairs)
     in_units: dict[str, Any] = {name: left.units.get(name) for name in pairs} | dict(units)
     a = np.column_stack([left.take(c, left.units[c]) for c in pairs])
     b = np.column_stack([right.take(their, in_units[our]) for our, their in pairs.items()])
@@ -250,12 +250,13 @@ def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[
                              f" together, as columns={{our name: their name}}")
         return pairs
     pairs = dict(given) if isinstance(given, Mapping) else {
-        instance("compare: columns: column", c, str, "a name"): c for c in several("compare: columns", given, "names")}
+        check_type("compare: columns: column", c, str, "a name"): c
+        for c in as_list("compare: columns", given, "names")}
     if len(pairs) < 2:
         raise InputError(f"compare: columns = {given!r}: a curve needs at least two columns")
     for our, their in pairs.items():
-        known(f"{left.name}: column", our, left.columns)
-        known(f"{right.name}: column", their, right.columns)
+        check_name(f"{left.name}: column", our, left.columns)
+        check_name(f"{right.name}: column", their, right.columns)
     return pairs
 
 
@@ -274,7 +275,7 @@ def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | No
     monotonic = [k for k in range(len(names)) if _is_monotonic(a[:, k]) and _is_monotonic(b[:, k])]
     if along is None:
         return min(monotonic, key=lambda k: _largest_slope(a, k), default=None)
-    known("compare: along", along, [*names, "arc length"])
+    check_name("compare: along", along, [*names, "arc length"])
     if along == "arc length":
         return None
     if names.index(along) not in monotonic:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ... import mesh as meshes
-from ...errors import InputError, known
+from ...errors import InputError, check_name
 from ...forms.probes import probe
 from ...io import csv_files
 from ...mesh import text as grid
@@ -144,7 +144,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
              else csv_files.read(theirs))
     names, units = dict(columns or {}), dict(units or {})
     for name in (*names, *units):
-        known("compare_nodes: column", name, ("node", *_columns(path)))
+        check_name("compare_nodes: column", name, ("node", *_columns(path)))
 
     def column(name: str) -> np.ndarray:
         """Return the other program's values of a column, in the unit of the run, by our name of the column."""

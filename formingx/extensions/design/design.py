@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ConvergenceError, InputError, count, instance, positive
+from ...errors import ConvergenceError, InputError, check_type, count, positive
 from ...measures.targets import Target
 from ...runs import Process, trace
 from ...scene.scene import Scene
@@ -138,7 +138,7 @@ class Design:
             InputError: neither or both of `wall` and `even` are given, or no parameter has an effect on the wall.
             ConvergenceError: the first run fails.
         """
-        if not instance("fit: even", even, bool, "True or False") and wall is None:
+        if not check_type("fit: even", even, bool, "True or False") and wall is None:
             raise InputError("fit: nothing to fit: give it wall=..., a wanted thickness, or even=True")
         if even and wall is not None:
             raise InputError("fit: wall and even=True are both given: must be one of them")

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, count, finite, instance, several
+from ...errors import InputError, as_list, check_type, count, finite
 
 
 class Knots:
@@ -92,10 +92,10 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
     >>> fx.spline(3, start=2.0, low=1.0).start.tolist()
     [2.0, 2.0, 2.0]
     """
-    required = 4 if instance("spline: smooth", smooth, bool, "True or False") else 2
+    required = 4 if check_type("spline: smooth", smooth, bool, "True or False") else 2
     if count("spline: knots", knots) < required:
         raise InputError(f"spline: knots = {knots}: must be at least {required}")
-    values = [start] * knots if np.ndim(start) == 0 else several("spline: start", start, "numbers")
+    values = [start] * knots if np.ndim(start) == 0 else as_list("spline: start", start, "numbers")
     if len(values) != knots:
         raise InputError(f"spline: start has {len(values)} numbers: must be one for each of {knots} knots")
     starts = np.array([finite("spline: start", v) for v in values])

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, cast
 
 import numpy as np
 
-from ...errors import InputError, count, finite_array, positive, several
+from ...errors import InputError, as_list, count, finite_array, positive
 from ...materials import branches, homogeneous
 from ...materials.hyperelastic import NeoHookean
 from ...materials.material import Material
@@ -143,7 +143,7 @@ def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
         InputError: an argument that is no list of tests, a test with inconsistent arrays, or no stress other than 0.
     """
     found = []
-    for i, test in enumerate(several("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
+    for i, test in enumerate(as_list("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
         if not isinstance(test, TimedTest):
             raise InputError(f"fit: data: number {i} is {test!r}: must be a TimedTest: a material that relaxes"
                              f" needs the time")

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ...errors import InputError, known
+from ...errors import InputError, check_name
 from ...io.csv_files import name_and_unit, records
 from ...io.numerals import is_number
 from ...materials.homogeneous import MODES
@@ -93,7 +93,7 @@ def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
     if len(row) != width or len(columns) not in (3, 4):
         raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"
                          f" time, the same in all lines")
-    known(f"{where}: test", row[columns[0]], MODES)
+    check_name(f"{where}: test", row[columns[0]], MODES)
     return row[columns[0]]
 
 

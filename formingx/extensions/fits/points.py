@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, known
+from ...errors import InputError, check_name
 from ...materials import homogeneous
 from .weights import divisors, in_range, named_weights
 
@@ -137,7 +137,7 @@ def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
     Raises:
         InputError: an unknown test, wrong shapes, or numbers that are not admissible.
     """
-    known("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
+    check_name("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
     biaxial = mode == "biaxial"
     what = "(stretch 1, stretch 2, nominal stress 1, nominal stress 2)" if biaxial else "(stretch, nominal stress)"
     try:

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, finite_array, instance, known
+from ...errors import InputError, check_name, check_type, finite_array
 from ...materials.homogeneous import MODES, in_plane_stretches
 from ...materials.material import Material
 
@@ -61,7 +61,7 @@ class MeasuredRange:
         """
         ranges, strains = {}, []
         for mode, given in stretches.items():
-            known("tests: test", mode, [*MODES, "biaxial"])
+            check_name("tests: test", mode, [*MODES, "biaxial"])
             l = finite_array(f"tests: {mode}", given)
             if l.size == 0 or not np.all(l > 0):
                 raise InputError(f"tests: {mode}: stretches must be above 0")
@@ -152,7 +152,7 @@ def with_tests(material: Material, **stretches: Any) -> Material:
     >>> fx.with_tests(fx.NeoHookean(c10=0.4), uniaxial=(1.0, 3.0)).tested
     uniaxial 1 to 3
     """
-    other = copy.copy(instance("with_tests: material", material, Material, "a material"))
+    other = copy.copy(check_type("with_tests: material", material, Material, "a material"))
     if not stretches:
         raise InputError("with_tests: no test is given: must be stretches of tests, such as uniaxial=(1, 4)")
     other.tested = MeasuredRange.from_stretches(stretches)

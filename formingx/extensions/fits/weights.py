@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, instance, non_negative, pair, several
+from ...errors import InputError, as_list, check_type, non_negative, pair
 
 _MIN_DIVISOR = 0.02
 """Smallest divisor of a relative misfit, over the largest stress of its test."""
@@ -27,7 +27,7 @@ def divisors(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np
     Raises:
         InputError: `relative` is neither True nor False.
     """
-    relative = instance("fit: relative", relative, bool, "True or False")
+    relative = check_type("fit: relative", relative, bool, "True or False")
     largest = max((float(np.abs(P).max()) for P in parts if len(P)), default=1.0) or 1.0
     found = []
     for P, weight in zip(parts, weights):
@@ -75,7 +75,7 @@ def numbered_weights(weights: Any, count: int) -> list[float]:
     """
     if weights is None:
         return [1.0] * count
-    given = several("fit: weights", weights, "numbers, one for each test")
+    given = as_list("fit: weights", weights, "numbers, one for each test")
     if len(given) != count:
         raise InputError(f"fit: weights: {len(given)} given: must be one for each of the {count} tests")
     return [_weight(f"fit: weights: number {k}", value) for k, value in enumerate(given, 1)]

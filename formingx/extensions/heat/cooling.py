@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, instance, known, positive, several
+from ...errors import InputError, as_list, check_name, check_type, positive
 from ...values.table import Table
 from ...values.temperature import ABSOLUTE_ZERO
 from .boundaries import Convection, FixedTemperature, ThermalProperties
@@ -87,11 +87,11 @@ class Cooling:
     def __init__(self, materials: ThermalProperties | Mapping[str, ThermalProperties], boundaries: Sequence[Any] = (),
                  *, unit: str, tools: Mapping[str, Any] | None = None, tolerance: float = 0.05,
                  work_to_heat: float | None = None):
-        known("Cooling: unit", unit, ABSOLUTE_ZERO)
+        check_name("Cooling: unit", unit, ABSOLUTE_ZERO)
         self.materials, self.unit, self.tolerance = materials, unit, positive("Cooling: tolerance", tolerance)
         self.work_to_heat = None if work_to_heat is None else positive("Cooling: work_to_heat", work_to_heat)
-        self.boundaries = several("Cooling: boundaries", boundaries, "boundaries, such as Convection(...)")
-        tools = {} if tools is None else instance("Cooling: tools", tools, Mapping, _TOOLS)
+        self.boundaries = as_list("Cooling: boundaries", boundaries, "boundaries, such as Convection(...)")
+        tools = {} if tools is None else check_type("Cooling: tools", tools, Mapping, _TOOLS)
         self.tools = {name: ToolHeat.of(name, given) for name, given in tools.items()}
 
     def __repr__(self) -> str:
@@ -138,7 +138,7 @@ class Cooling:
             InputError: `boundaries` is neither a list of laws nor a dict.
         """
         laws = [FixedTemperature(name, temperature=T) for name, T in boundaries.items()] if isinstance(
-            boundaries, Mapping) else several("Path.springback: boundaries", boundaries,
+            boundaries, Mapping) else as_list("Path.springback: boundaries", boundaries,
                                               "boundaries, such as Convection(...)")
         conductivity = max(m.conductivity for m in checked_materials(mesh, self.materials).values())
         h = _SUDDEN_CONDUCTANCE * conductivity / thickness
@@ -229,7 +229,7 @@ class Cooling:
         """
         names = [contact.name for contact in scene.contacts]
         for name in self.tools:
-            known("Cooling: tools: contact", name, names)
+            check_name("Cooling: tools: contact", name, names)
         touching = [(contact, self.tools[contact.name]) for contact in scene.contacts if self.conducts(contact)]
         return [ContactWithTool(contact.on, conductance=given.conductance, tool=given.tool)
                 for contact, given in touching]

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from dolfinx import fem
 
-from ...errors import InputError, finite, known
+from ...errors import InputError, check_name, finite
 from ...ranks import gathered
 from ...results import files
 from ...scene.fields import PointReader
@@ -257,7 +257,7 @@ class HeatRun:
             InputError: no conducting tool is in contact with the boundary, or a time outside the run.
         """
         conducting = {t.on: k for k, t in enumerate(self._body.tool_contacts) if t.conducts}
-        known("tool_profile: conducting tool on boundary", on, conducting)
+        check_name("tool_profile: conducting tool on boundary", on, conducting)
         number = conducting[on]
         touch, excess = self._body.tool_contacts[number], self._state_at(time)[1 + number]
         away = np.hypot(*(touch.points - np.asarray(point, dtype=float)).T)

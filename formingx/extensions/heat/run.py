@@ -10,7 +10,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ... import _compat
-from ...errors import ConvergenceError, InputError, finite, instance, known, positive, several
+from ...errors import ConvergenceError, InputError, as_list, check_name, check_type, finite, positive
 from ...mesh import Mesh
 from ...mesh.nodes import dof_positions
 from ...physics.kinematics import Axisymmetric
@@ -67,7 +67,7 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
     """
     if not isinstance(mesh, Mesh):
         raise InputError(f"heat: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
-    known("heat: unit", unit, ABSOLUTE_ZERO)
+    check_name("heat: unit", unit, ABSOLUTE_ZERO)
     materials = checked_materials(mesh, materials)
     boundaries = checked_boundaries(mesh, boundaries, ABSOLUTE_ZERO[unit])
     outputs = _times(times)
@@ -226,8 +226,8 @@ def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties
     if not isinstance(materials, Mapping):
         raise InputError(f"heat: materials = {materials!r}: must be ThermalProperties(...), or {{layer: ...}}")
     for name, material in materials.items():
-        known("heat: materials: layer", name, mesh.layers)
-        instance(f"heat: materials[{name!r}]", material, ThermalProperties, "ThermalProperties(...)")
+        check_name("heat: materials: layer", name, mesh.layers)
+        check_type(f"heat: materials[{name!r}]", material, ThermalProperties, "ThermalProperties(...)")
     missing = [name for name in mesh.layers if name not in materials]
     if missing:
         raise InputError(f"heat: layer {missing[0]!r} has no material: give its ThermalProperties")
@@ -250,14 +250,14 @@ def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> lis
             that does not cover its boundary. Also a second law, except `Absorption`, on a face of prescribed
             temperature.
     """
-    found = several("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
+    found = as_list("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
     prescribed = [b.on for b in found if isinstance(b, FixedTemperature)]
     for boundary in found:
         if not hasattr(boundary, "on") or not (hasattr(boundary, "flux") or hasattr(boundary, "check")) \
                 or isinstance(boundary, type):
             raise InputError(f"heat: boundaries: {boundary!r} is not allowed here: must be a list of Convection,"
                              f" Radiation, HeatFlux, FixedTemperature, ContactWithTool, Absorption")
-        known(f"heat: {boundary!r}: boundary", boundary.on, mesh.boundaries)
+        check_name(f"heat: {boundary!r}: boundary", boundary.on, mesh.boundaries)
         if hasattr(boundary, "check"):
             boundary.check(mesh, absolute_zero)
         if boundary.on in prescribed and hasattr(boundary, "check") and not isinstance(boundary, FixedTemperature):
@@ -267,7 +267,7 @@ def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> lis
 
 def _times(times: Any) -> np.ndarray:
     """Return the output times, shape (n,); raise an InputError unless they are positive and increasing."""
-    listed = [times] if np.ndim(times) == 0 and not isinstance(times, str) else several("heat: times", times, "times")
+    listed = [times] if np.ndim(times) == 0 and not isinstance(times, str) else as_list("heat: times", times, "times")
     found = np.array([positive("heat: times", finite("heat: times", t)) for t in listed])
     if not len(found) or np.any(np.diff(found) <= 0):
         raise InputError(f"heat: times = {times!r}: must be one time or several that grow")

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...errors import InputError, finite_array, instance, known, positive
+from ...errors import InputError, check_name, check_type, finite_array, positive
 from ...materials import branches
 from ...materials.constants import OfTemperature, Sample
 from ...materials.homogeneous import MODES
@@ -69,9 +69,9 @@ class KBKZ(RelaxingMaterial):
             raise InputError(f"KBKZ: spectrum = {spectrum!r}: the moduli grow with the times, from {G.min():g} to"
                              f" {G.max():g}: must be (G, tau); of (eta, lambda) make KBKZ.of_viscosities(...)")
         if damping is not None:
-            instance("KBKZ: damping", damping, Damping, "PSM(alpha, beta), Wagner(alpha, beta) or None")
+            check_type("KBKZ: damping", damping, Damping, "PSM(alpha, beta), Wagner(alpha, beta) or None")
         self.damping = damping
-        self.integral = MemoryIntegral(self.spectrum, damping, instance("KBKZ: irreversible", irreversible, bool,
+        self.integral = MemoryIntegral(self.spectrum, damping, check_type("KBKZ: irreversible", irreversible, bool,
                                                                   "True or False"), shift is not None)
         if shift is not None:
             self.parameters["aT"] = OfTemperature(checked_shift("KBKZ", shift), repr(shift))
@@ -251,7 +251,7 @@ class KBKZ(RelaxingMaterial):
         Raises:
             InputError: an unknown mode.
         """
-        known(f"{self}: rupture_stretch: mode", mode, MODES)
+        check_name(f"{self}: rupture_stretch: mode", mode, MODES)
         l = np.geomspace(1, 100, 4000)
         stresses = self._modulus(0.0) * self._damped_difference(mode, l) + self._relaxed_stress(mode, l) * l
         falls = np.flatnonzero(stresses[1:] < stresses[:-1])

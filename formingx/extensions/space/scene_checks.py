@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, call_on_all_ranks, finite, known, positive, values
+from ...errors import InputError, call_on_all_ranks, check_name, finite, positive, values
 from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode
 from ...ranks import gathered
@@ -42,7 +42,7 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
                          " {layer: ...}")
     each = given if isinstance(given, Mapping) else dict.fromkeys(mesh.layers, given)
     for name in each:
-        known("Scene: thickness: layer", name, mesh.layers)
+        check_name("Scene: thickness: layer", name, mesh.layers)
     for name in mesh.layers:
         if name not in each:
             raise InputError(f"Scene: thickness: layer {name!r} has none")

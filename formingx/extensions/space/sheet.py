@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, instance, known, non_negative, pair, positive, several
+from ...errors import InputError, as_list, check_name, check_type, non_negative, pair, positive
 from ...mesh import with_gmsh
 from ...mesh.check import crossing_point
 from ...mesh.grid import Grid, counter_clockwise, to_mesh
@@ -95,7 +95,7 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     """
     a, b = positive("rectangle: width", width) / 2, positive("rectangle: height", height) / 2
     r = non_negative("rectangle: corner", corner)
-    known("rectangle: part", part, _PARTS)
+    check_name("rectangle: part", part, _PARTS)
     if r > min(a, b):
         raise InputError(f"rectangle: corner = {corner!r}: must be at most half the shorter side, {min(a, b):g}")
     found: list[Edge] = []
@@ -177,30 +177,30 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     layers: sheet
     boundaries: rim, x0, bottom, top
     """
-    edges = several("sheet: outline", outline, "corners (x, y), or what fx.mesh.rectangle gives")
+    edges = as_list("sheet: outline", outline, "corners (x, y), or what fx.mesh.rectangle gives")
     if not all(isinstance(edge, Edge) for edge in edges):
         corners = [pair("sheet: outline: corner", point) for point in edges]
         if len(corners) < 3:
             raise InputError(f"sheet: outline = {outline!r}: must have at least three corners")
         edges = [Edge(a, b, None, "rim") for a, b in zip(corners, [*corners[1:], corners[0]])]
     if names is not None:
-        called = several("sheet: names", names, "words")
+        called = as_list("sheet: names", names, "words")
         if len(called) != len(edges):
             raise InputError(f"sheet: names: {len(called)} names for {len(edges)} edges: must be one for each")
         edges = [edge._replace(name=name) for edge, name in zip(edges, called)]
     for edge in edges:
-        if instance("sheet: names: name", edge.name, str, "a word") in ("bottom", "top", ""):
+        if check_type("sheet: names: name", edge.name, str, "a word") in ("bottom", "top", ""):
             raise InputError(f"sheet: names: name = {edge.name!r}: must be a word, not that of a face")
     x = _chords(edges)
     edge_length = _Size(size)
     areas, sizes = edge_length.area_and_size(x)
-    lines = several("sheet: reflected", reflected, "names")
+    lines = as_list("sheet: reflected", reflected, "names")
     for k, name in enumerate(lines):
-        known("sheet: reflected: boundary", name, {edge.name for edge in edges} - set(lines[:k]))
+        check_name("sheet: reflected: boundary", name, {edge.name for edge in edges} - set(lines[:k]))
     if 2 ** len(lines) * np.sum(areas / (0.4 * sizes**2)) > MAX_TRIANGLES:
         raise InputError(f"sheet: size = {size!r}: would make more than {MAX_TRIANGLES} triangles of the sheet, whose"
                          f" area is {areas.sum():.4g}")
-    words = several("sheet: layers", layers, "names")
+    words = as_list("sheet: layers", layers, "names")
     if not words or len(set(words)) < len(words):
         raise InputError(f"sheet: layers = {layers!r}: must be at least one name, and each another")
     plain = to_mesh(lambda: reduce(_reflected, lines, _grid(edges, edge_length)), comm, "sheet")

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, as_points, instance, known, non_negative, pair, positive, triple
+from ...errors import InputError, as_points, check_name, check_type, non_negative, pair, positive, triple
 from ...io.stl import volume, write_stl
 from ...physics.contact import Contact
 from ...physics.contact_law import ContactLaw
@@ -264,7 +264,7 @@ def revolved(profile: Tool) -> Swept:
     >>> ball.bounds.round(6).tolist()
     [[-10.0, -10.0, 0.0], [10.0, 10.0, 20.0]]
     """
-    return Swept(instance("revolved: profile", profile, Tool, "a Tool"), "revolved")
+    return Swept(check_type("revolved: profile", profile, Tool, "a Tool"), "revolved")
 
 
 def extruded(profile: Tool, along: str = "y") -> Swept:
@@ -283,8 +283,8 @@ def extruded(profile: Tool, along: str = "y") -> Swept:
     >>> fx.tools.extruded(fx.tools.sphere(radius=10.0)).signed_distance([[0.0, 55.0, -1.0]]).tolist()
     [-1.0]
     """
-    known("extruded: along =", along, ("x", "y"))
-    return Swept(instance("extruded: profile", profile, Tool, "a Tool"), "extruded", along=along)
+    check_name("extruded: along =", along, ("x", "y"))
+    return Swept(check_type("extruded: profile", profile, Tool, "a Tool"), "extruded", along=along)
 
 
 def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet: float = 0.0, lip: float = 0.0,

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, direction, file_path, instance, positive
+from ...errors import InputError, check_type, direction, file_path, positive
 from ...io.stl import volume
 from ...mesh.edges import edges_of
 from .bodies import merged, separate_bodies
@@ -115,7 +115,7 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
     points, triangles = merged(*_read(name))
     points = points * positive("solid: scale", scale)
     _check_closed(points, triangles, f"solid: {name!r}")
-    if instance("solid: inverted", inverted, bool, "True or False"):
+    if check_type("solid: inverted", inverted, bool, "True or False"):
         triangles = triangles[:, ::-1]
     if volume(points, triangles) <= 0:
         raise InputError(f"solid: {name!r} is inside out: its triangles look inward: use inverted={not inverted}")

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, finite, instance
+from ...errors import InputError, check_type, finite
 from ...mesh.grid import gathered, to_mesh
 from ...mesh.mesh import Mesh
 from .instability import CriticalPoint
@@ -32,8 +32,8 @@ def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     >>> point = fx.trace(pressed, until=fx.travel(-1.9), progress=False).stability([0]).first
     >>> bent = fx.with_imperfection(column, point, 0.01)
     """
-    instance("with_imperfection: mesh", mesh, Mesh, "a mesh")
-    mode = instance("with_imperfection: mode", mode, CriticalPoint, "a CriticalPoint that Path.stability found")
+    check_type("with_imperfection: mesh", mesh, Mesh, "a mesh")
+    mode = check_type("with_imperfection: mode", mode, CriticalPoint, "a CriticalPoint that Path.stability found")
     amplitude = finite("with_imperfection: amplitude", amplitude)
     if mode.number or mode.antisymmetric_about:
         raise InputError(f"with_imperfection: mode: {mode!r}: varies round the body, or is antisymmetric about a mirror"

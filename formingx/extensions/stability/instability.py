@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, count, finite, several
+from ...errors import InputError, as_list, count, finite
 from ...ranks import gathered
 from ...results.extend import method_of
 from ...results.numbers import without_round_off
@@ -428,7 +428,7 @@ def _selected_states(path: Any, states: Any) -> list[State]:
     """
     regular = [s for s in path.states if s.kind != "limit point"]
     if isinstance(states, State | list | tuple):
-        given = several("stability: states", [states] if isinstance(states, State) else states, "states of the path")
+        given = as_list("stability: states", [states] if isinstance(states, State) else states, "states of the path")
         if any(all(s is not entry for entry in path.states) for s in given):
             raise InputError("stability: states: must be of this path")
         if not given:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import ConvergenceError, InputError, instance, known, positive
+from ...errors import ConvergenceError, InputError, check_name, check_type, positive
 from ...measures.targets import travel as travel_to
 from ...mesh.mesh import Mesh
 from ...physics.contact import Contact
@@ -167,9 +167,9 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     >>> round(found.largest_force, 4)
     0.0023
     """
-    instance("top_load: body", body, Mesh, "a mesh, such as path.deformed_mesh()")
-    known("top_load: neck", neck, body.boundaries)
-    known("top_load: foot", foot, body.boundaries)
+    check_type("top_load: body", body, Mesh, "a mesh, such as path.deformed_mesh()")
+    check_name("top_load: neck", neck, body.boundaries)
+    check_name("top_load: foot", foot, body.boundaries)
     travel = positive("top_load: travel", travel)
     if floor is None:
         floor = plane(float(body.nodes_of(foot)[:, 1].min())).reversed()

@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, count, file_path, known
+from ...errors import InputError, check_name, count, file_path
 from ...results.files import replace
 from ...results.files.column_table import ColumnTable
 from . import effects, stored_runs
@@ -183,7 +183,7 @@ class Study(ColumnTable):
             name: (min(levels), max(levels)) for name in self.variables
             if len(levels := {run.values[name] for run in self.runs}) > 1}
         for name in within:
-            known("refine: variable", name, self.variables)
+            check_name("refine: variable", name, self.variables)
         low, high = np.array(list(within.values()), dtype=float).T
         worst = max(map(self._cost, self.successful))
 
@@ -234,7 +234,7 @@ class Study(ColumnTable):
 
     def _checked_measure(self, measure: str) -> str:
         """Return the name of a measure; raise an InputError if the study does not have it."""
-        known("Study: measure", measure, self.measures)
+        check_name("Study: measure", measure, self.measures)
         return measure
 
     def _store(self, run: StudyRun) -> None:
@@ -283,8 +283,8 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     cases = sets_of_values(variables)
     task, goals = Task(build, _measures(build, measure)), dict(goal or {})
     for name, direction in goals.items():
-        known("study: goal", name, task.measure)
-        known(f"study: goal of {name}:", direction, ("max", "min"))
+        check_name("study: goal", name, task.measure)
+        check_name(f"study: goal of {name}:", direction, ("max", "min"))
     names = list(cases[0])
     folder = None if folder is None else stored_runs.prepare_folder(file_path("study: folder", folder), task, names)
     found = Study(task, names, goals, folder)

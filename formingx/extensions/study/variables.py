@@ -4,7 +4,7 @@ import itertools
 from collections.abc import Mapping
 from typing import Any
 
-from ...errors import InputError, finite, several
+from ...errors import InputError, as_list, finite
 
 
 def sets_of_values(variables: Any) -> list[dict[str, float]]:
@@ -20,12 +20,12 @@ def sets_of_values(variables: Any) -> list[dict[str, float]]:
         InputError: variables or values that are not allowed.
     """
     if isinstance(variables, Mapping):
-        levels = {str(name): [finite(f"study: {name}", v) for v in several(f"study: {name}", values, "numbers")]
+        levels = {str(name): [finite(f"study: {name}", v) for v in as_list(f"study: {name}", values, "numbers")]
                   for name, values in variables.items()}
         found = [dict(zip(levels, row)) for row in itertools.product(*levels.values())]
     else:
         found = [{str(k): finite(f"study: {k}", v) for k, v in dict(case).items()}
-                 for case in several("study: variables", variables, "{name: value}")]
+                 for case in as_list("study: variables", variables, "{name: value}")]
     if not found or not found[0] or any(set(case) != set(found[0]) for case in found):
         raise InputError("study: variables: must be {name: values}, with at least one value each, or a list of"
                          " {name: value} with the same names")

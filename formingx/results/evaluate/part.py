@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...errors import InputError, finite, known, positive, several
+from ...errors import InputError, as_list, check_name, finite, positive
 from ...scene.symmetry import NO_PLANES, MirrorPlanes
 from ...units import NONE, Units
 from ..numbers import PartNumbers, without_round_off
@@ -108,7 +108,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     average = (of_strip * area * inside).sum() / sums[1]
     spread = ((of_strip - average) ** 2 * area * inside).sum() / sums[1]
     weight = None if density is None else units.mass(images * sums[3], positive("part: density", density))
-    walls_at = {finite("part: heights", h): wall.at_height(h) for h in several("part: heights", heights, "numbers")}
+    walls_at = {finite("part: heights", h): wall.at_height(h) for h in as_list("part: heights", heights, "numbers")}
     return Part(images * sums[0], images * sums[1], sums[1] / sums[2], mean, float(wall.wall[k]),
                 float(wall.reference_radius[k]),
                 without_round_off((wall.r[k], wall.z[k]), profile.middle), float(wall.height[k]),
@@ -133,7 +133,7 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
     if trim is None:
         return inside
     coordinate, value = trim if isinstance(trim, tuple) and len(trim) == 2 else ("r", trim)
-    known("part: trim along", coordinate, ("r", "height"))
+    check_name("part: trim along", coordinate, ("r", "height"))
     value, line = finite("part: trim", value), wall.r if coordinate == "r" else wall.height
     crossed = np.flatnonzero((line[:-1] < value) & (line[1:] >= value))
     if not len(crossed):

@@ -32,7 +32,7 @@ from numpy.typing import ArrayLike
 from petsc4py import PETSc
 
 from ... import _compat
-from ...errors import InputError, as_points, known, pair
+from ...errors import InputError, as_points, check_name, pair
 from ...mesh.locate import LocatedPoints, locate
 from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from ...physics.kinematics import BLOCK
@@ -246,7 +246,7 @@ class Stresses:
             if len(self.cells) > 1:
                 raise InputError(f"stress: which layer? known: {', '.join(map(repr, self.cells))}")
             return next(iter(self.cells))
-        known("stress: layer", name, self.cells)
+        check_name("stress: layer", name, self.cells)
         return name
 
     def project(self, state: Any) -> np.ndarray:

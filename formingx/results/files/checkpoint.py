@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from dolfinx import fem
 
-from ...errors import InputError, file_path, instance
+from ...errors import InputError, check_type, file_path
 from ...findings import Finding
 from ...measures.targets import Target
 from ...problem.problem import Problem
@@ -204,7 +204,7 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
         InputError: there is no checkpoint, it is damaged, it belongs to another scene, or it has no such state.
     """
     folder = file_path("load: folder", folder)
-    problem = Problem(instance("load: scene", scene, Scene, "a formingx.Scene"))
+    problem = Problem(check_type("load: scene", scene, Scene, "a formingx.Scene"))
     about = describe(problem)
 
     def look():

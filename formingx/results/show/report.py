@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, several
+from ...errors import InputError, as_list
 from ...findings import Finding
 from ...units import NONE, Units
 from .. import files
@@ -53,8 +53,8 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
     'report.html'
     """
     from ..files import checkpoint_data
-    runs = several("report: runs", runs, "paths or folders of checkpoints")
-    names = [f"run {k}" for k in range(1, len(runs) + 1)] if names is None else several("report: names", names, "words")
+    runs = as_list("report: runs", runs, "paths or folders of checkpoints")
+    names = [f"run {k}" for k in range(1, len(runs) + 1)] if names is None else as_list("report: names", names, "words")
     if not runs or len(names) != len(runs):
         raise InputError(f"report: {len(runs)} runs and {len(names)} names: give at least one run, and a name for each")
     records = [of_path(run) if hasattr(run, "problem") else of_checkpoint(*checkpoint_data.contents(run))
