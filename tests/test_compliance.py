@@ -68,7 +68,7 @@ def test_condensed_solutions_are_the_full_ones(solver, monkeypatch):
     border = compliance.BorderedTangent(vector(random.normal(size=N)), vector(random.normal(size=N)), 0.7)
 
     def moved(dx, step):
-        return dx[ROWS] * 2 - step * np.arange(len(ROWS))
+        return dx[ROWS] * 2 - np.multiply.outer(np.arange(len(ROWS)), step)
     full = compliance.columns(made, E, border)
     monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(columns=7, rows=N))
     condensed = compliance.columns(made, E, border)

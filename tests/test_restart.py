@@ -312,7 +312,8 @@ def test_another_format_is_refused(copied, number):
     folder, scene = copied
     about = json.loads((folder / "scene.json").read_text()) | {"formingx": number}
     (folder / "scene.json").write_text(json.dumps(about))
-    with pytest.raises(fx.InputError, match=f"has the format {number}; this version of formingx reads 9"):
+    read = checkpoint_data.FORMAT
+    with pytest.raises(fx.InputError, match=f"has the format {number}; this version of formingx reads {read}"):
         fx.load(folder, scene)
 
 

@@ -2,7 +2,7 @@
 
 A gap is closed where the signed distance of a point from its tool exceeds -theta, the outer edge of the ramp of the
 contact law. Contact with tools in three dimensions is lagged: the closed points, and the pressure that limits their
-friction, are those of the last accepted state.
+friction, belong to the last accepted state.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ class StepLimits:
     """Limits that contact sets to a step.
 
     Contact with tools in three dimensions is lagged: the closed points, and the pressure that bounds their friction,
-    are those of the last accepted state.
+    belong to the last accepted state.
 
     Attributes:
         closed_at_start: fraction of a step; gaps that close earlier in the step count as closed at its start.

@@ -231,7 +231,7 @@ class Execution:
     def _run_control(self, numbers: list[int], begun: bool) -> None:
         """Run a stage in which the amplitude of one load, support or contact is the control.
 
-        numbers: its index in `Scene.items`, then those of the items that move with it. begun: True to continue the run.
+        numbers: its index in `Scene.items`, then the indices of items that move with it. begun: True to continue it.
         """
         control = None if begun else self._enter_control(numbers)
         self._trace(self._left_to_meet(), control)
@@ -239,7 +239,7 @@ class Execution:
     def _enter_control(self, numbers: list[int], clocked: bool = True) -> float:
         """Set step data in which the amplitude of a load, support or contact is the control; return its present value.
 
-        numbers: its index in `Scene.items`, then those of the items that move with it. clocked: True if process time
+        numbers: its index in `Scene.items`, then the indices of items that move with it. clocked: True if process time
         may pass while the control changes.
         """
         base, rate, control = control_step_data(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
@@ -259,7 +259,7 @@ class Execution:
     def _prescribe(self, numbers: list[int], begun: bool) -> None:
         """Run a stage in which one load or tool is adjusted so that another quantity follows an amplitude in time.
 
-        numbers: its index in `Scene.items`, then those of the loads, supports and contacts with the same amplitude.
+        numbers: its index in `Scene.items`, then the indices of other items with the same amplitude.
         begun: True to continue the run.
         """
         control = None if begun else self._enter_control(numbers, clocked=False)

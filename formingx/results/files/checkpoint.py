@@ -286,9 +286,9 @@ def _read_state(data: dict, problem: Any) -> State:
     last = problem.comm.rank == problem.comm.size - 1
     arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
               for name in FIELDS}
-    met, stored = data.pop("met"), (f.name for f in fields(State) if f.name not in (*FIELDS, *HISTORIES))
-    return State(**arrays, target=Target(met[0], met[1], None, met[2]) if met else None,
-                 history=[Iteration(*row) for row in data.pop("history")], inadmissible_reason=data.pop("verdict"),
+    target, stored = data.pop("target"), (f.name for f in fields(State) if f.name not in (*FIELDS, *HISTORIES))
+    return State(**arrays, target=Target(target[0], target[1], None, target[2]) if target else None,
+                 history=[Iteration(*row) for row in data.pop("history")],
                  history_variables=_read_history_variables(problem, data.pop("memory")),
                  **{name: data[name] for name in stored if name in data})
 
@@ -337,10 +337,10 @@ def _tail(space: Any, owned: np.ndarray) -> list[float]:
 
 def _plain_state(state: State) -> dict[str, Any]:
     """Return the attributes of a state as JSON data, without its unknowns and history variables."""
-    excluded = (*FIELDS, *HISTORIES, "target", "history", "inadmissible_reason")
+    excluded = (*FIELDS, *HISTORIES, "target", "history")
     data = {f.name: getattr(state, f.name) for f in fields(State) if f.name not in excluded}
-    return data | {"met": state.target and [state.target.name, state.target.value, state.target.signed],
-                   "verdict": state.inadmissible_reason, "history": [list(i) for i in state.history]}
+    return data | {"target": state.target and [state.target.name, state.target.value, state.target.signed],
+                   "history": [list(i) for i in state.history]}
 
 
 def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> list[Any]:

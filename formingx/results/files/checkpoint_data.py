@@ -17,7 +17,7 @@ from .arrays import unpack
 from .description import differences
 from .progress import progress
 
-FORMAT = 10  # number of the format of the files, in scene.json
+FORMAT = 11  # number of the format of the files, in scene.json
 FIELDS = ("x", "direction")
 HISTORIES = ("history_variables", "history_variables_before")
 ARRAYS = "arrays.bin"

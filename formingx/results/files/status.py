@@ -111,7 +111,7 @@ def of_folder(folder: Any) -> Status:
     counts = stepping.get("counts", {})
     name, goal = target_column(stepping, last["measures"]) or ("", 0.0)
     if name not in last["measures"]:
-        return Status(n, last["stage"], last["verdict"], None, counts.get("seconds", 0.0), None,
+        return Status(n, last["stage"], last["inadmissible_reason"], None, counts.get("seconds", 0.0), None,
                       counts.get("limits", {}), age, ended)
     now, before = done[-1]["measures"][name], done[0]["measures"][name]
     moved = {c: (done[0]["measures"][c], done[-1]["measures"][c]) for c in _MOVES if c in last["measures"]}
@@ -121,7 +121,7 @@ def of_folder(folder: Any) -> Status:
     nearer = won > 0 and abs(goal - now) < abs(goal - done[-2]["measures"][name])
     remaining = 0.0 if abs(now - goal) <= _TARGET_TOLERANCE * abs(goal) else took * (1 - won) / won if nearer else None
     moving = leader if leader and not np.isclose(*moved[leader], rtol=_NEGLIGIBLE_CHANGE, atol=0.0) else None
-    return Status(n, last["stage"], last["verdict"], (name, goal, now), counts["seconds"], remaining,
+    return Status(n, last["stage"], last["inadmissible_reason"], (name, goal, now), counts["seconds"], remaining,
                   counts.get("limits", {}), age, ended, len(done) == 1, (moving, *moved[moving]) if moving else None)
 
 

@@ -292,7 +292,8 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
                   target_column(stepping, measures), tooling,
                   [tooling.travels(s.get("setting", {}), s["control"]) for s in states],
                   {name: measures[column] for name, column in tooling.force_columns.items() if column in measures},
-                  _temperatures(states, profiles[-1]), {}, inadmissible_reasons=[s["verdict"] for s in states],
+                  _temperatures(states, profiles[-1]), {},
+                  inadmissible_reasons=[s["inadmissible_reason"] for s in states],
                   space=about["scene"]["kinematics"]["kind"] == "ThreeD",
                   planes=MirrorPlanes.of_description(about["scene"]), **ended, **_heat(about["scene"].get("heat")))
 
