@@ -210,7 +210,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
             "model": ("optional thing", None), "kinematics": ("optional thing", None),
             "quadrature_degree": ("count or None", 5), "temperature": ("optional number", None),
             "heat": ("optional thing", None), "expansion": ("optional thing", None),
-            "thickness": ("optional thing", None), "preformed": ("optional thing", None)}, _run),
+            "thickness": ("optional thing", None), "state_transfer": ("optional thing", None)}, _run),
         Call("StepControl", fx.StepControl, {
             "length": positive, "target": ("count", 4), "growth": positive, "smallest": positive,
             "largest": ("step", 1.0)}, lambda s: fx.trace(_scene(), until=fx.pole_height(0.1), step=s, progress=False)),

@@ -14,10 +14,10 @@ from mpi4py import MPI
 
 from . import InputError, compare
 from .results.files import checkpoint_data, status
+from .results.files.column_table import PRINTED_ROWS
 from .results.show import report
 from .units import NONE, Units
 
-_SHOWN_STATES = 20                    # approximate number of states that `open` shows
 _COMPARE = """Compare a run's CSV file with another program's curve: differences, limit points, a picture.
 The header of THEIRS names its columns and may state units: pressure [psi]."""
 
@@ -187,7 +187,7 @@ def _open(options: argparse.Namespace) -> None:
     _say("\n".join([*lines, "", *_states(record), "", *record.warnings()]).rstrip())
 
 
-def _states(record: report.Record) -> list[str]:
+def _states(record: report.ReportData) -> list[str]:
     """Return the lines of a table of states of a recorded run.
 
     They show limit points, jumps, the last state of each stage, and evenly spaced other states.
@@ -196,7 +196,7 @@ def _states(record: report.Record) -> list[str]:
     columns = [c for end in ends for c in record.measures if c.endswith(end)][:6]
     n, stages = len(record.kinds), record.stages
     marked = [k for k in range(n) if record.kinds[k] in ("limit point", "jump") or stages[k:k + 2] != [stages[k]] * 2]
-    room = max(_SHOWN_STATES - len(marked), 2)
+    room = max(2 * PRINTED_ROWS - len(marked), 2)
     shown = sorted({*marked, *np.linspace(0, n - 1, min(n, room)).round().astype(int).tolist()})
     lines = [f"{'state':>5}  {'kind':12}" + "".join(f"{c.replace('_', ' '):>16}" for c in columns)]
     lines += [f"{k:5}  {record.kinds[k]:12}" + "".join(f"{record.measures[c][k]:16.8g}" for c in columns)

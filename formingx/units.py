@@ -109,11 +109,11 @@ class Units:
             The mass, g; in plane strain g per unit of depth.
 
         Raises:
-            InputError: a number is not finite, or the density is above 25 g/cm3.
+            InputError: a number is not finite, or the density is above 22.6 g/cm3.
         """
         volume, density = finite("mass: volume", volume), finite("mass: density", density)
-        if density > _MAX_DENSITY:
-            raise InputError(f"density = {density:g}: must be in g/cm3 (water has 1), at most {_MAX_DENSITY:g}")
+        if density > _DENSITY_OF_OSMIUM:
+            raise InputError(f"density = {density:g}: must be in g/cm3 (water has 1, osmium {_DENSITY_OF_OSMIUM:g})")
         return volume * (LENGTHS[self.length or "cm"] / LENGTHS["cm"]) ** 3 * density
 
     def unit_of(self, column: str) -> str:
@@ -170,8 +170,8 @@ class _UnitsPerDepth(Units):
         return f"{unit}/{self.length or 'cm'}" if unit else ""
 
 
-_MAX_DENSITY = 25.0
-"""Largest density that is accepted, g/cm3."""
+_DENSITY_OF_OSMIUM = 22.6
+"""Density of osmium, the densest of all materials, g/cm3."""
 
 NONE: Any = Units()
 """Units of a script that states none."""

@@ -66,5 +66,5 @@ def plug_force(path) -> float:
 
 
 def path_warnings(path) -> list:
-    from formingx.results.show import record
-    return record.of_path(path).warnings()
+    from formingx.results.show import report_data
+    return report_data.of_path(path).warnings()

@@ -32,7 +32,7 @@ from formingx.results.files.fields import Fields
 from formingx.results.files.solid import solid
 from formingx.results.show import animation, plots, report
 from formingx.results.show.picture import Picture
-from formingx.results.show.record import progress
+from formingx.results.show.report_data import progress
 
 
 @pytest.fixture(scope="module")

@@ -109,8 +109,10 @@ def test_tuned_numbers_have_a_name_each():
 
 
 GIVEN = {"STEFAN_BOLTZMANN", "GAS_CONSTANT", "_PSI", "_KG_PER_CM2", "FORMAT", "_LONGEST", "COORDINATES", "components",
-         "dimension_of_volume", "quadrature_degree"}
-"""Constants of physics, formats and dimensions: they are not tuned."""
+         "dimension_of_volume", "quadrature_degree", "_DENSITY_OF_OSMIUM", "_power", "_STRESS_ORDER", "DIGITS",
+         "PRINTED_ROWS"}
+"""Constants of physics (the densest material), formats (digits and rows of output), dimensions and powers of a law, and
+the order of the stress of quadratic elements: they are not tuned."""
 
 
 def is_number(node):
@@ -129,9 +131,9 @@ def test_the_count_of_tuned_numbers_only_falls():
         for line in (line for line in (*tops, *fields) if isinstance(line, ast.Assign | ast.AnnAssign)):
             name = ast.unparse(line.targets[0] if isinstance(line, ast.Assign) else line.target)
             values = line.value.elts if isinstance(line.value, ast.Tuple) else [line.value]
-            if name not in GIVEN and all(map(is_number, values)):
+            if name not in GIVEN and values and all(map(is_number, values)):
                 found += [(name_of(file), name)] * len(values)
-    assert len(found) <= 350
+    assert len(found) <= 267
 
 
 def members(tree):

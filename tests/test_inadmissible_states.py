@@ -58,10 +58,10 @@ def test_a_sheet_that_folds_ends_the_run():
 
 def test_open_and_report_name_the_inadmissible_state(tmp_path):
     from formingx.results.files import checkpoint_data
-    from formingx.results.show import record
+    from formingx.results.show import report_data
     fx.trace(foot(), until=fx.travel(-0.85), progress=False, allow_inadmissible=True, checkpoint=tmp_path / "run")
-    for found in (record.of_checkpoint(*checkpoint_data.contents(tmp_path / "run")),
-                  record.of_path(fx.load(tmp_path / "run", foot()))):
+    for found in (report_data.of_checkpoint(*checkpoint_data.contents(tmp_path / "run")),
+                  report_data.of_path(fx.load(tmp_path / "run", foot()))):
         assert any("the results must not be used:" in text and "inside out" in text for text in found.warnings())
 
 

@@ -295,11 +295,11 @@ def test_tangled_meshes_are_refused(change, words):
         moved(change).check()
 
 
-@pytest.mark.parametrize("largest", [0, boxes._MAX_DIRECT], ids=["tree", "direct"])
+@pytest.mark.parametrize("largest", [0, boxes.MAX_COMPARED], ids=["tree", "direct"])
 @pytest.mark.parametrize("shape", ["scattered", "a row", "a column", "all over each other"])
 def test_overlapping_boxes_are_found(shape, largest, monkeypatch):
     """Each overlapping pair is found once, as by comparison of all pairs."""
-    monkeypatch.setattr(boxes, "_MAX_DIRECT", largest)
+    monkeypatch.setattr(boxes, "MAX_COMPARED", largest)
     random = np.random.default_rng(3)
     for n in (1, 2, 3, 64, 65, 200):
         low = random.uniform(0, 1, (n, 2)) * {"a row": (1, 0), "a column": (0, 1)}.get(shape, (1, 1))

@@ -380,7 +380,7 @@ def test_transfer_of_a_deformation_is_of_third_order():
     """F of r -> r s(z), with det F = 1: of third order, up to the faces, however it turns."""
     import ufl
 
-    from formingx.extensions.remeshing.preformed import Preformed
+    from formingx.extensions.remeshing.state_transfer import StateTransfer
     from formingx.forms.transfer import in_own_cells
     places = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 / 3, 1 / 3]])
 
@@ -394,7 +394,7 @@ def test_transfer_of_a_deformation_is_of_third_order():
         turn = np.stack([rr + zz, zr - rz]) / np.hypot(rr + zz, zr - rz)
         b = np.stack([rr**2 + rz**2, rr * zr + rz * zz, zr**2 + zz**2, hoop**2, *turn], -1)
         forms = forms_of(n + 3)
-        F, J = Preformed(at, at, b, np.zeros((len(at), 3, 0))).gradient(forms)
+        F, J = StateTransfer(at, at, b, np.zeros((len(at), 3, 0))).gradient(forms)
         wanted = [F[0, 0], F[0, 1], F[1, 0], F[1, 1], F[2, 2], *forms.X, ufl.det(F) / J, J]
         found = in_own_cells(forms.domain, ufl.as_vector(wanted), np.array([[0.3, 0.2], [0.1, 0.7]])).reshape(-1, 9)
         errors.append(np.abs(found[:, :5] - deformation(found[:, 5], found[:, 6])).max())
@@ -426,7 +426,7 @@ def test_mean_stress_is_conserved_by_the_transfer(monkeypatch):
         old, new = path.segments[0], path.segments[1].problem
         with old.problem.state_context(old.states[-1]):
             before = mean(old.problem.forms)
-        new.x.array_w[:] = new.scene.preformed.unknowns(new)
+        new.x.array_w[:] = new.scene.state_transfer.unknowns(new)
         new.set_state(new.x, state.control)
         assert mean(new.forms) == pytest.approx(before, rel=1e-3)
         assert abs(state.jump["force"]) < force and abs(state.jump["energy"]) < energy

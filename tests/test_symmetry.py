@@ -8,7 +8,7 @@ import pytest
 import formingx as fx
 from formingx.io.stl import volume
 from formingx.results.files import checkpoint_data
-from formingx.results.show import record
+from formingx.results.show import report_data
 
 C10, UNITS = 0.4, fx.Units(length="mm", stress="MPa")
 HELD = {"whole": [], "half": [fx.Symmetry("x0", "x")], "quarter": [fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")]}
@@ -159,7 +159,7 @@ def test_tool_beside_a_plane_is_one_of_two():
 def test_report_of_a_checkpoint_knows_the_planes(tmp_path):
     path = fx.trace(block("half"), until=fx.travel(-0.4), progress=False)
     path.save(tmp_path / "run")
-    found = record.of_checkpoint(*checkpoint_data.contents(tmp_path / "run"))
+    found = report_data.of_checkpoint(*checkpoint_data.contents(tmp_path / "run"))
     assert found.planes.planes == path.scene.symmetry.planes and found.per_depth
     text = path.report(tmp_path / "bar.html", units=UNITS, density=1.0).read_text()
     assert "given for the whole part (a half was modelled), per mm of depth" in text and "N/mm" in text
@@ -177,7 +177,7 @@ def test_report_in_space_draws_the_whole_part_and_its_tool(parts, tmp_path):
     """The sheet's triangles, frame by frame, with its images; the box, which is whole, once."""
     from formingx.extensions.space import show
     path = parts["quarter"]
-    drawn = show._mesh(path, record.of_path(path), UNITS)
+    drawn = show._mesh(path, report_data.of_path(path), UNITS)
     assert list(drawn["fields"]) == ["wall, mm", "wall / original"] and len(drawn["tools"][0]["images"]) == 1
     assert len(drawn["points"]) == len(drawn["fields"]["wall, mm"]) == len(path)
     assert min(drawn["fields"]["wall, mm"][-1]) == pytest.approx(path.wall().at_nodes.min(), rel=1e-4)

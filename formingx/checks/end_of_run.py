@@ -5,6 +5,7 @@ from typing import Any
 
 from ..findings import Finding, register
 from ..results.evaluate import edges, resticking, snaps, tension, volume
+from ..values.tolerances import NOTICEABLE
 
 
 @register("end")
@@ -20,7 +21,7 @@ def inadmissible(path: Any) -> Iterator[Finding]:
 def volumes(path: Any) -> Iterator[Finding]:
     """Report elements that do not keep their volumes in the last state of a `Path`; collective."""
     error = path.last.measures["volume_error"]
-    yield from volume.findings(error, "the last state", volume.away_from_clamps(path) if error > volume.BOUND else None)
+    yield from volume.findings(error, "the last state", volume.away_from_clamps(path) if error > NOTICEABLE else None)
     yield from volume.extreme_ratio(path)
 
 

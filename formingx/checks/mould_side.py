@@ -11,7 +11,6 @@ from ..scene.scene import Scene
 from ..tools.tool import RigidTool
 
 _OPPOSITE = {"top": "bottom", "bottom": "top", "inner": "outer", "outer": "inner"}
-_COVERED = 0.5  # fraction of a face with a tool in front of it, above which the tool is its mould
 
 
 def moulds(scene: Scene) -> list[Contact]:
@@ -90,4 +89,4 @@ def _covers_face(scene: Scene, contact: Contact) -> bool:
     if not len(points):
         return False
     free = free_distance(contact.tool, points, directions, 100 * float(np.ptp(points, axis=0).max()))
-    return bool(np.mean(np.isfinite(free)) >= _COVERED)
+    return bool(np.isfinite(np.percentile(free, 50, method="lower")))

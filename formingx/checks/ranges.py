@@ -9,8 +9,9 @@ import numpy as np
 from ..findings import Finding, register
 from ..physics.loads import CentrifugalLoad, Gravity
 from ..values.table import Table
+from ..values.tolerances import ROUND_OFF
 from .mould_side import moulds, sign_towards
-from .sizes import Body
+from .sizes import LARGEST_LOAD, Body
 
 _LARGEST_FRICTION = 5.0         # coefficient of friction; rubber on dry steel has 1 to 4
 _LONGEST_IN_METRES = 5.0        # longest body whose length may be in metres
@@ -18,8 +19,6 @@ _SHORTEST_IN_MICROMETRES = 1e3  # shortest body whose length may be in micrometr
 _SMALLEST_MODULUS = 1e-7        # shear modulus: 0.1 Pa in MPa
 _LARGEST_MODULUS = 1e11         # shear modulus: 100 GPa in Pa
 _LARGEST_MODULUS_IN_MM = _LARGEST_MODULUS / 1e6   # for a length in mm: 100 GPa in MPa, 100 MPa in kPa, 690 MPa in psi
-_LARGEST_WEIGHT = 1e3           # weight over shear modulus; above it no body is in equilibrium
-_SMALLEST_WEIGHT = 1e-10        # weight over shear modulus; below it has no effect
 
 
 @register("start")
@@ -58,7 +57,7 @@ def weight(body: Body) -> Iterator[Finding]:
         size = body.length if isinstance(load, Gravity) else body.length**2
         stress = max(load.density.values()) * abs(load.value) * size
         ratio = stress / max(body.moduli.values())
-        if ratio > _LARGEST_WEIGHT or 0 < ratio < _SMALLEST_WEIGHT:
+        if ratio > LARGEST_LOAD or 0 < ratio < ROUND_OFF:
             what = "tears the body apart" if ratio > 1 else "moves nothing"
             yield Finding("warning", repr(load),
                           f"density x acceleration x length is {ratio:.2g} times the shear modulus"

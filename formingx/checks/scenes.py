@@ -11,12 +11,11 @@ from ..physics.supports import PrescribedDisplacement, Symmetry
 from ..scene.scene import Scene
 from ..scene.target_checks import unreachable
 from ..tools.shapes import Arc
+from ..values.tolerances import MEASURED_ACCURACY
 from .sizes import Body
 
 _ASPECT_RATIO = 110.0       # longest edge over height; discs with 100 give correct results in benchmarks/extremes.py
-_SOFT_ELEMENT_LENGTH = 2.0  # element length over thickness of a soft layer, for a modulus ratio of 150 to 1000
 _ELEMENTS_PER_FILLET = 2.0  # smallest number of elements along a fillet
-_PENETRATION = 0.01         # largest penetration over the thickness
 
 
 @register("scene")
@@ -84,7 +83,7 @@ def _layers(body: Body) -> Iterator[Finding]:
     hard, soft = (pick(body.moduli, key=body.moduli.__getitem__) for pick in (max, min))
     ratio = body.moduli[hard] / body.moduli[soft]
     depth, edge = body.area[body.layer == soft].sum() / body.length, body.edge[body.layer == soft].min()
-    if 100 < ratio <= 1e5 and edge > _SOFT_ELEMENT_LENGTH * depth:
+    if 100 < ratio <= 1e5 and edge / 2 > depth:                     # nodes are half an edge apart
         yield Finding("warning", f"layer {soft!r}",
                       f"it is {ratio:.3g} times softer than {hard!r} and {body.format(depth, 'travel', 3)} thick, its"
                       f" elements {body.format(edge, 'travel', 3)} long or more: near a rim its shear rises within a"
@@ -141,7 +140,7 @@ def _contact_penalties(body: Body) -> Iterator[Finding]:
     for contact in body.scene.contacts:
         traction = max([stress * body.thickness / body.length, *presses])
         depth = traction / (contact.penalty * stress)
-        if depth > _PENETRATION:
+        if depth > MEASURED_ACCURACY:
             cause = "the target pressure" if presses else "a pressure of shear modulus times thickness over length"
             yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g} lets {cause},"
                           f" {body.format(traction, 'stress', 3)}, press the face {100 * depth:.2g} % of the thickness"

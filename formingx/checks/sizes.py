@@ -14,6 +14,7 @@ from ..materials.inflation import FreeInflation, Peak, first_peak
 from ..measures.targets import Target
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
+from ..results.evaluate.edges import EDGE_ANGLE
 from ..scene.contact_checks import OTHER_UNIT
 from ..scene.scene import Scene
 from ..solve.stage import Stage
@@ -23,14 +24,14 @@ from .mould_side import free_distance, outward_directions
 
 Found = Iterator[Finding]
 
-_LARGEST_PRESSURE = 100.0  # pressure over shear modulus that fills every corner
+LARGEST_LOAD = 100.0
+"""Pressure, or weight over area, divided by the shear modulus, that fills every corner and tears every body apart."""
+
 _SMALLEST_PRESSURE = 1e-4  # pressure over shear modulus x thickness / length that has no effect
 _ABOVE_PEAK = 1.1          # pressure over the maximum of a spherical cap, which is 3 % below the maximum of a disc
 _REMAINING_PRESSURE = 0.8  # lowest pressure beyond the limit point of a tube over its maximum (tests/test_check.py)
 _BLOW_RATIO = 8.0          # largest blow ratio of bottles
 _MOULD_DEPTH = 0.5         # height of a wall over the opening: a mould is higher, a grip lower
-_CORNER_ANGLE = 10.0       # degrees by which a profile turns at a sharp corner
-_POSITIONS = 400           # number of examined positions of a moving tool
 _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an exponent above 2) does"
 
 
@@ -225,7 +226,7 @@ def _pressures(body: Body) -> Found:
                           f" {body.format(stiff, 'stress')}), and moves nothing: are the units of stress the same (Pa,"
                           f" kPa, MPa)?")
         free = not body.scene.contacts and abs(value) > 1e3 * body.pressure_scale
-        if free or abs(value) > _LARGEST_PRESSURE * stiff:
+        if free or abs(value) > LARGEST_LOAD * stiff:
             size, what = stiff, "shear modulus"
             usual = "about ten times the shear modulus fills a corner as small as the wall"
             if free:
@@ -364,8 +365,8 @@ def _tool_paths(body: Body) -> Found:
         faces = [(c.tool, body.scene.mesh.nodes_of(c.on)) for c in contacts]
         start = _gap(faces, tool.direction, 0.0)
         travel_range = max([*travels, 0.0]) or 3 * size + 2 * max(start, 0.0)
-        gaps = np.array([_gap(faces, tool.direction, travel) for travel in np.linspace(0, travel_range, _POSITIONS)])
         tolerance = 0.5 * min(body.edge.min(), body.thickness)
+        gaps = _gaps(faces, tool.direction, start, travel_range, tolerance)
         if gaps.min() <= tolerance and (start > tolerance or gaps[1] <= gaps[0]) or not travel_range > 0:
             continue
         if gaps[1] > gaps[0] and gaps[-1] > gaps[0] and (start <= tolerance or not others or not travels):
@@ -379,6 +380,26 @@ def _tool_paths(body: Body) -> Found:
                           f"it touches nothing on its way: over a travel of {body.format(travel_range, 'travel')} it"
                           f" comes no nearer to {tool.on!r} than {body.format(gaps.min(), 'travel')}: place it nearer"
                           f" (moved), change its direction, or let it travel farther")
+
+
+def _gaps(faces: list[tuple[Tool, np.ndarray]], direction: Any, start: float, travel_range: float,
+          tolerance: float) -> np.ndarray:
+    """Return the gaps of moving tools (`_gap`) at positions in order, up to the first touch or the end, shape (n,).
+
+    From one position to the next the tools move by half the gap or the tolerance, so they pass no face.
+
+    Args:
+        faces: pairs (tool, nodes of the face that it touches, shape (n, c), length).
+        direction: displacement of all tools per travel, shape (c,).
+        start: gap without travel, length.
+        travel_range: largest travel, length.
+        tolerance: gap up to which a tool touches a face, length.
+    """
+    travel, gaps, speed = 0.0, [start], float(np.linalg.norm(direction))
+    while travel < travel_range and (len(gaps) == 1 or gaps[-1] > min(tolerance, start)):
+        travel = min(travel + max(gaps[-1] / 2, tolerance) / speed, travel_range)
+        gaps.append(_gap(faces, direction, travel))
+    return np.array(gaps)
 
 
 def _gap(faces: list[tuple[Tool, np.ndarray]], direction: Any, travel: float) -> float:
@@ -410,7 +431,7 @@ def _sharp_edges(body: Body) -> Found:
         pieces = contact.tool.pieces
         for a, b in zip(pieces, pieces[1:] + (pieces[:1] if contact.tool.closed else ())):
             turn = np.degrees((b.angles[0] - a.angles[1] + np.pi) % (2 * np.pi) - np.pi)
-            if turn > _CORNER_ANGLE:                                # the solid is to the left: convex
+            if turn > EDGE_ANGLE:                                # the solid is to the left: convex
                 yield Finding("warning", repr(contact),
                               f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
                               f" there are off by 1 to 3 %, depending on where nodes lie, and more elements"

@@ -12,8 +12,6 @@ from ..contact.tooling import Tooling
 from ..findings import Finding, register
 from .mould_side import moulds
 
-_GAP_GROWTH = 1.1  # smallest ratio of the mean distances of a face from its mould, end over start, that is reported
-
 
 @register("end")
 def untouched(path: Any) -> Iterator[Finding]:
@@ -41,7 +39,7 @@ def untouched(path: Any) -> Iterator[Finding]:
         law, tool = contacts[0].contact, contacts[0].contact.name or contacts[0].contact.on
         gaps = f"the gap was {start.min():.4g} at first and {end.min():.4g} at the end"
         if law.direction is None and any(entry.contact in mould_contacts for entry in contacts) and \
-                end.mean() > _GAP_GROWTH * start.mean() + contacts[0].thickness:
+                end.mean() > start.mean() + contacts[0].thickness:
             yield Finding("warning", tool, f"the body moved away from this mould: the mean distance of its face"
                           f" {law.on!r} grew from {start.mean():.4g} to {end.mean():.4g}. Does the pressure act on the"
                           f" other face, and has it the right sign?")

@@ -140,7 +140,7 @@ class Lobatto(_Nodes):
 
     def __init__(self, solid: Any, on: str, assemble: Any):
         kinematics, vectors, numbers = solid.scene.kinematics, *_displacements(solid)
-        self._brought = solid.scene.preformed
+        self._brought = solid.scene.state_transfer
         nodes = np.sort(fem.locate_dofs_topological(vectors, 1, solid.scene.mesh.facets_of(on)))
         own = numbers[nodes, 0] < solid.space.dofmap.index_map.size_local
         self.dofs = numbers[nodes[own]]

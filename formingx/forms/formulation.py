@@ -52,7 +52,7 @@ class Formulation(ControlledLoads):
         F: deformation gradient (UFL, shape (3, 3)).
         elastic_F: F without thermal expansion (UFL, shape (3, 3)).
         J: det `elastic_F` divided by `ratio_before` (UFL scalar).
-        ratio_before: det F of the deformation transferred from another mesh (`Preformed`), else 1.
+        ratio_before: det F of the deformation transferred from another mesh (`StateTransfer`), else 1.
         dx: measure of the domain.
         weight: reference volume per measure `dx` (UFL scalar).
         control: `Constant` of the dimensionless load parameter (control).
@@ -210,7 +210,7 @@ class Formulation(ControlledLoads):
         Returns:
             The `Probe`.
         """
-        return Probe(problem, points) if self.scene.preformed is None else self.scene.preformed.probe(problem, points)
+        return Probe(problem, points) if (old := self.scene.state_transfer) is None else old.probe(problem, points)
 
     def mean_row(self, constraint: Any) -> Any:
         """Return the linear form that gives the mean of a displacement component over a boundary.

@@ -95,7 +95,7 @@ class MaterialTerms:
         Returns:
             `Function` of a quadrature element with the values of f.
         """
-        found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.preformed
+        found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.state_transfer
 
         def values(X: np.ndarray) -> np.ndarray:
             R, Z = X[:2] if brought is None else brought.original_positions(X[:2].T).T

@@ -145,9 +145,9 @@ class Solid(Formulation):
 
     def _deformation_gradient(self) -> Any:
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
-        if self.scene.preformed is None:
+        if self.scene.state_transfer is None:
             return F
-        before, self.ratio_before = self.scene.preformed.gradient(self)
+        before, self.ratio_before = self.scene.state_transfer.gradient(self)
         return F * before
 
     def _groups(self) -> list[tuple[Any, list[str]]]:

@@ -17,7 +17,7 @@ _DECIMAL_COMMA = re.compile(r"[+-]?[0-9]*,[0-9]+(?:[eE][+-]?[0-9]+)?")
 UNITS = {"length": LENGTHS, "stress": STRESSES, "volume": _VOLUMES}
 
 
-class Table(NamedTuple):
+class CsvTable(NamedTuple):
     """Columns of numbers with n rows, from a CSV file or from arrays.
 
     Attributes:
@@ -88,7 +88,7 @@ def conversion(unit: str, requested: str) -> float:
     raise InputError(f"{unit!r} cannot be turned into {requested!r}: they measure different quantities")
 
 
-def read(file: Any) -> Table:
+def read(file: Any) -> CsvTable:
     """Return the table in a CSV file with its units; columns without any number are left out.
 
     The first row is the header: it names the columns, with units in brackets, as in "pressure [psi]".
@@ -118,7 +118,7 @@ def read(file: Any) -> Table:
     text = {head: [row[k] for _, row in cells[1:]] for k, head in enumerate(names)}
     columns = {head: np.array([float(c) if is_number(c) else np.nan for c in column]) for head, column in text.items()
                if any(is_number(c) for c in column)}
-    return Table(name, columns, {head: unit for head, unit in heads if head in columns}, text.get("kind"))
+    return CsvTable(name, columns, {head: unit for head, unit in heads if head in columns}, text.get("kind"))
 
 
 def records(file: Any) -> list[tuple[int, list[str]]]:
@@ -177,7 +177,7 @@ def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
     return found
 
 
-def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
+def from_arrays(name: str, columns: Mapping[str, Any]) -> CsvTable:
     """Return a table made from arrays, without units.
 
     Args:
@@ -197,7 +197,7 @@ def from_arrays(name: str, columns: Mapping[str, Any]) -> Table:
     if len(shapes) != 1 or len(next(iter(shapes))) != 1 or next(iter(shapes))[0] < 2:
         raise InputError(f"{name}: columns must be as long as each other, with at least 2 values; they have the shapes"
                          f" {', '.join(f'{k}: {a.shape}' for k, a in arrays.items()) or 'none'}")
-    return Table(name, arrays, dict.fromkeys(arrays))
+    return CsvTable(name, arrays, dict.fromkeys(arrays))
 
 
 def name_and_unit(cell: str) -> tuple[str, str | None]:

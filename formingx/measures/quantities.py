@@ -153,11 +153,11 @@ class Sag(Quantity):
         self._problem, self._dofs = problem, dofs[dofs < problem.n_owned]
         self.size = self._scale = forms.length
         self._earlier: np.ndarray | float = 0.0               # u_z of the nodes before this mesh was made, over length
-        if (preformed := forms.scene.preformed) is not None:
+        if (state_transfer := forms.scene.state_transfer) is not None:
             space, numbers = forms.space.sub(0).sub(forms.scene.kinematics.components - 1).collapse()
             order = np.argsort(numbers)
             nodes_at = dof_positions(space)[order[np.searchsorted(numbers, self._dofs, sorter=order)]]
-            self._earlier = (nodes_at - preformed.original_positions(nodes_at))[:, -1] / forms.length
+            self._earlier = (nodes_at - state_transfer.original_positions(nodes_at))[:, -1] / forms.length
 
     def _largest_sag(self, x: Any) -> tuple[float, int]:
         """Return the sag over the length scale, and the rank that owns the lowest node; `x`: unknowns. Collective."""

@@ -10,9 +10,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..mesh.nodes import own_cells
-
-_ZERO_STRESS = 1e-10
-"""Stress over the shear modulus below which a stress counts as zero."""
+from ..values.tolerances import ROUND_OFF
 
 _ADDED_STRAIN = 1e-6
 """Equibiaxial strain that is added if the stresses are zero: the ratio of stresses is then the ratio of the moduli."""
@@ -67,7 +65,7 @@ class PoleStressRatio:
             The ratio; if both stresses are zero, the ratio of the moduli.
         """
         stored, relaxed, modulus = self._integrals()
-        if relaxed < _ZERO_STRESS * modulus:
+        if relaxed < ROUND_OFF * modulus:
             self._strain.value = _ADDED_STRAIN
             stored, relaxed, _ = self._integrals()
             self._strain.value = 0.0

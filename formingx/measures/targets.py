@@ -350,8 +350,8 @@ def _volume(problem: Any, form: Any = None) -> Quantity:
     On a remeshed body it includes the volume that the face swept on earlier meshes. form: as in `bind_volume`.
     """
     earlier = 0.0
-    if problem.scene.preformed is not None:
-        old, state = problem.scene.preformed.before
+    if problem.scene.state_transfer is not None:
+        old, state = problem.scene.state_transfer.before
         with old.state_context(state):
             earlier = _volume(old).value(old.x, state.control)
     form = swept_volume(problem) if form is None else form

@@ -6,9 +6,9 @@ import numpy as np
 
 from .._jit import address, address_of_integers
 from .compiled import compiled
+from .nodes import MAX_COMPARED
 
 _CHUNK = 2**18      # pairs that are compared at a time
-_MAX_DIRECT = 1024  # largest number of boxes whose pairs are compared without a tree
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
@@ -21,7 +21,7 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
     Yields:
         Indices i and j of overlapping boxes, shape (k,) each. Every pair occurs once, in either order.
     """
-    if len(low) <= _MAX_DIRECT:
+    if len(low)**2 <= MAX_COMPARED:
         pairs, count = np.empty((0, 2), dtype=int), 8 * len(low)
         while len(pairs) < count:
             pairs = np.empty((count, 2), dtype=int)

@@ -6,13 +6,10 @@ import numpy as np
 
 from .._jit import address, address_of_integers
 from ..errors import InputError
+from ..values.tolerances import FAR, ROUND_OFF
 from .boxes import overlapping
 from .compiled import compiled
 from .edges import edges_of
-
-_MIN_LENGTH = 1e-50                      # lengths whose squares are still numbers
-_MAX_LENGTH = 1 / _MIN_LENGTH             # lengths whose products are still numbers
-_MIN_AREA = 1e-12                          # area over the square of the longest edge that counts as 0
 
 
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
@@ -31,12 +28,12 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     if len(bad):
         raise InputError(f"{what}: a node has the coordinates {_show(points[bad[0]])}: must be finite numbers")
     size = float(np.ptp(points, axis=0).max())
-    if not _MIN_LENGTH < size < _MAX_LENGTH or np.abs(points).max() > _MAX_LENGTH:
-        raise InputError(f"{what}: it is {size:.3g} large: must be between {_MIN_LENGTH:g} and {_MAX_LENGTH:g}")
+    if not 1 / FAR < size < FAR or np.abs(points).max() > FAR:
+        raise InputError(f"{what}: it is {size:.3g} large: must be between {1 / FAR:g} and {FAR:g}")
     corners = points[triangles[:, :3]]
     area = _cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(1) for i in range(3)], axis=0)
-    flat = np.abs(area) <= _MIN_AREA * longest
+    flat = np.abs(area) <= ROUND_OFF * longest
     if flat.any():
         raise InputError(f"{what}: {flat.sum()} elements are flat, one at {_show(corners[flat][0].mean(0))}")
     inside_out = inverted(points[triangles])
@@ -169,7 +166,7 @@ def crossing_edges(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray
         Indices of the two edges of each pair, shape (m, 2), m > 0.
     """
     low, high = points[edges].min(1), points[edges].max(1)
-    tolerance = 1e-9 * float((high - low).max())
+    tolerance = ROUND_OFF * float((high - low).max())
     for first, second in overlapping(low - tolerance, high + tolerance):
         crosses = np.zeros(len(first))
         compiled().cross(len(first), address_of_integers(first), address_of_integers(second), address(points),

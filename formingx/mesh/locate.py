@@ -8,10 +8,8 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
+from ..values.tolerances import NEGLIGIBLE
 from .nodes import own_cells
-
-OUTSIDE = 1e-3
-"""Distance from a cell, over its size, within which a point counts as inside; curved edges are approximate."""
 
 
 class LocatedPoints(NamedTuple):
@@ -54,9 +52,9 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
     padded[:, :2] = points
     found = np.full(len(points), -1)
     reference = np.zeros((len(points), dim))
-    depth = np.full(len(points), -OUTSIDE)
+    depth = np.full(len(points), -NEGLIGIBLE)
     if len(cells):
-        tree = _compat.tree_of_cells(mesh, OUTSIDE * size, cells)
+        tree = _compat.tree_of_cells(mesh, NEGLIGIBLE * size, cells)
         candidates = geometry.compute_collisions_points(tree, padded)
         for i, point in enumerate(padded):
             for cell in candidates.links(i):

@@ -7,8 +7,11 @@ from mpi4py import MPI
 
 from .. import _compat
 
+SAME_PLACE = 1e-5
+"""Distance, over the extent of a body, below which two places are one: names of points have six digits."""
+
 MAX_COMPARED = 1_000_000
-"""Number of compared coordinates above which nearest points are sought with a tree."""
+"""Number of pairs of points or boxes above which a tree finds the near ones."""
 COORDINATES = 2
 """Number of reference coordinates of a point of the body: (R, Z); (x, y) of a sheet in three dimensions."""
 

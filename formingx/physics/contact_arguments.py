@@ -7,8 +7,11 @@ from ..errors import InputError, count, non_negative
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
 
-_MAX_POINTS = 100
-"""Largest number of Gauss points on a facet."""
+MAX_DEGREE = 30
+"""Largest degree of a quadrature rule: higher degrees are mistakes, and their points would fill the memory."""
+
+_MAX_POINTS = (MAX_DEGREE + 1) // 2
+"""Largest number of Gauss points on a facet: n points are exact to degree 2 n - 1."""
 
 
 def coefficient(name: str, friction: Any) -> Any:
@@ -49,7 +52,7 @@ def contact_points(name: str, points: Any) -> str | int:
         The argument `points`.
 
     Raises:
-        InputError: `points` is neither "nodes" nor a number from 1 to 100.
+        InputError: `points` is neither "nodes" nor a number from 1 to 15.
     """
     if isinstance(points, str) and points == "nodes":
         return points

@@ -15,9 +15,7 @@ import numpy as np
 
 from ..tools.profile import Nearest, Tool
 from ..tools.tool import PlaneTool
-
-FAR = 1e30
-"""A number that stands for infinity, finite so that its product with 0 is 0."""
+from ..values.tolerances import FAR
 
 
 class ContactStatus(IntEnum):

@@ -25,10 +25,9 @@ import numpy as np
 
 from ..errors import InputError, check_name, check_type, finite, non_negative, positive
 from ..mesh.triangles import Place, Triangles
+from ..values.tolerances import LARGE_ERROR, WALL_ERROR
 
 _SLENDER_TRIANGLE = 3.0                                # slenderness of triangles that can do harm
-_WARNED_ERROR = 0.003                         # expected error above which a check warns
-_REFUSED_ERROR = 0.05                              # expected error above which a scene is refused
 
 
 class Locking(NamedTuple):
@@ -45,7 +44,7 @@ class Locking(NamedTuple):
     place: Place
 
     def __str__(self) -> str:
-        share = "several" if self.error > _REFUSED_ERROR else "about one"
+        share = "several" if self.error > LARGE_ERROR else "about one"
         return (f"triangles are up to {self.slenderness:.3g} times taller than wide across the thickness (at"
                 f" {self.place}): the default element locks in them, and bending comes out too stiff, by {share} per"
                 f" cent: use more elements through the thickness (at most 1.5 times taller than wide), fewer along the"
@@ -202,7 +201,7 @@ class MixedPressure(Model):
 
     def check(self, scene):
         found = self.locking(scene.mesh)
-        if found is not None and found.error > _REFUSED_ERROR:
+        if found is not None and found.error > LARGE_ERROR:
             raise InputError(f"Scene: {found}")
 
     def locking(self, mesh):
@@ -231,7 +230,7 @@ class MixedPressure(Model):
         across = (body.edge < body.thickness) & (body.slenderness > _SLENDER_TRIANGLE)
         error = np.where(across, 0.3 * body.slenderness * (body.edge / body.length) ** 2.5, 0.0)
         mean, worst = float((error * body.area).sum() / body.area.sum()), int(np.argmax(error))
-        return Locking(mean, float(body.slenderness[worst]), body.place(worst)) if mean > _WARNED_ERROR else None
+        return Locking(mean, float(body.slenderness[worst]), body.place(worst)) if mean > WALL_ERROR else None
 
     def terms(self, J, p, modulus, eps):
         r"""Return the energy density that enforces incompressibility, a Lagrange multiplier with a penalty.

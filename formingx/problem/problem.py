@@ -121,8 +121,8 @@ class Problem(Stages, Units):
         Returns:
             Reference positions on this mesh, shape (n, 2), length.
         """
-        preformed = self.scene.preformed
-        return points if preformed is None else preformed.followed(self, points)
+        state_transfer = self.scene.state_transfer
+        return points if state_transfer is None else state_transfer.followed(self, points)
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         stage, multipliers, fields = self._stage, self.set_state(x, control), x.array_r[: self._n]

@@ -7,10 +7,8 @@ import numpy as np
 
 from ..errors import InputError
 from ..physics.contact import Contact
+from ..values.tolerances import CURVE_POINTS, PIECE_POINTS
 from .scene import Scene
-
-_CHECKED_POSITIONS = 50        # number of positions of the tools that are checked in each piece of a stage
-_MAX_TOOL_POINTS = 1000           # largest number of points of a tool in three dimensions that are checked
 
 
 def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
@@ -43,7 +41,7 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
                     scene.check_travel(tools[i], ends[i])
                 except InputError as error:
                     raise InputError(f"{plan.stage.label}: {error}") from None
-            for part in np.linspace(0, 1, _CHECKED_POSITIONS) if ends != travels else [1.0]:
+            for part in np.linspace(0, 1, PIECE_POINTS) if ends != travels else [1.0]:
                 current = {i: travels[i] + part * (ends[i] - travels[i]) for i in tools}
                 _check_overlap(scene, plan.stage.label, present, outlines, current)
             travels = ends
@@ -93,11 +91,11 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
     """Return points on the profile of a tool without travel, shape (n, 2), length, `pieces` of them on each line.
 
-    In three dimensions they are at most about 1000 vertices of the surface of the tool, shape (n, 3).
+    In three dimensions they are at most about 4000 vertices of the surface of the tool, shape (n, 3).
     """
     points, lines = contact.tool.surface()
     if contact.tool.components == 3:
-        return points[:: max(1, len(points) // _MAX_TOOL_POINTS)]
+        return points[:: max(1, len(points) // CURVE_POINTS)]
     (a, b), parts = points[lines.T][..., None, :], np.linspace(0, 1, pieces, endpoint=False)[:, None]
     return np.concatenate([*(a + parts * (b - a)), points[-1:]])
 

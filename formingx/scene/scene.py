@@ -19,6 +19,7 @@ from ..mesh.contact_columns import for_contacts
 from ..mesh.mesh import Mesh
 from ..mesh.nodes import span
 from ..physics.contact import Contact
+from ..physics.contact_arguments import MAX_DEGREE
 from ..physics.kinematics import Axisymmetric, Kinematics, ThreeD
 from ..physics.loads import Load
 from ..physics.models import Membrane, MixedPressure, Model
@@ -32,8 +33,6 @@ from .temperature import Expansion, GivenTemperature
 
 log = logging.getLogger("formingx")
 
-_MAX_DEGREE = 30
-"""Largest degree of a quadrature rule: higher degrees are mistakes, and their points would fill the memory."""
 
 
 class Scene:
@@ -58,7 +57,7 @@ class Scene:
         heat: `Cooling(...)` for a temperature that changes with time.
         expansion: thermal expansion, a `ThermalExpansion` for all layers, or {layer: `ThermalExpansion`}.
         thickness: thickness of a sheet in three dimensions: a length, a function of arrays (x, y), or {layer: either}.
-        preformed: deformation transferred from another mesh; only remeshing (`trace(remesh=)`) sets it.
+        state_transfer: deformation transferred from another mesh; only remeshing (`trace(remesh=)`) sets it.
 
     Attributes:
         mesh: mesh of the body. For a scene with tools its elements may differ from the given mesh: they are chosen for
@@ -75,7 +74,7 @@ class Scene:
         expansion: {layer: law of thermal expansion}.
         thickness: {layer: thickness} of a sheet in three dimensions, else empty.
         symmetry: mirror planes of the body (`MirrorPlanes`).
-        preformed: deformation transferred from another mesh, or None.
+        state_transfer: deformation transferred from another mesh, or None.
 
     Raises:
         InputError: a boundary or a layer is unknown or empty, a layer has no material, or the supports are too few.
@@ -96,7 +95,7 @@ class Scene:
     def __init__(self, *, mesh: Mesh, materials: Material | Mapping[str, Material], supports: Sequence[Any],
                  loads: Sequence[Any] = (), contacts: Sequence[Contact] = (), model: Any = None, kinematics: Any = None,
                  quadrature_degree: int | None = None, temperature: Any = None, heat: Any = None,
-                 expansion: Any = None, thickness: Any = None, preformed: Any = None):
+                 expansion: Any = None, thickness: Any = None, state_transfer: Any = None):
         if not isinstance(mesh, Mesh):
             raise InputError(f"Scene: mesh = {mesh!r}: must come from formingx.mesh (disc, read, ...)")
         if isinstance(materials, Material):
@@ -104,9 +103,9 @@ class Scene:
         if not isinstance(materials, Mapping):
             raise InputError(f"Scene: materials = {materials!r}: must be a formingx material, or {{layer: material}}")
         mesh.check()                                           # a script may have moved its nodes
-        if preformed is not None and not hasattr(preformed, "gradient"):
-            raise InputError(f"Scene: preformed = {preformed!r}: must be what trace(remesh=) makes, or None")
-        self.mesh, self.preformed = mesh, preformed
+        if state_transfer is not None and not hasattr(state_transfer, "gradient"):
+            raise InputError(f"Scene: state_transfer = {state_transfer!r}: must be what trace(remesh=) makes, or None")
+        self.mesh, self.state_transfer = mesh, state_transfer
         self._extent = np.ptp(span(mesh.domain, mesh.comm), axis=0)
         self.materials = dict(materials)
         self.supports = _checked_items(Support, "supports", supports, "supports, such as Clamped('rim')")
@@ -120,7 +119,7 @@ class Scene:
         if not isinstance(self.kinematics, Kinematics) or (self.kinematics.components == 3) != in_space:
             raise InputError(f"Scene: kinematics = {kinematics!r}: must be Axisymmetric() or PlaneStrain(), of a sheet"
                              f" in three dimensions ThreeD()")
-        if preformed is None and not self._has_constants_of_mesh():
+        if state_transfer is None and not self._has_constants_of_mesh():
             self.mesh = for_contacts(mesh, self.contacts, self.kinematics.axisymmetric, heat is not None)
             if self.mesh is not mesh:
                 log.info("elements chosen for the tools: %d columns instead of %d",
@@ -129,8 +128,8 @@ class Scene:
         usual = 1 if in_space else 5
         self.quadrature_degree = count("Scene: quadrature_degree",
                                        usual if quadrature_degree is None else quadrature_degree)
-        if self.quadrature_degree > _MAX_DEGREE:
-            raise InputError(f"Scene: quadrature_degree = {quadrature_degree!r}: must be at most {_MAX_DEGREE}")
+        if self.quadrature_degree > MAX_DEGREE:
+            raise InputError(f"Scene: quadrature_degree = {quadrature_degree!r}: must be at most {MAX_DEGREE}")
         if temperature is not None:
             self.temperature = GivenTemperature(temperature, mesh)
         if expansion is not None:
@@ -153,7 +152,7 @@ class Scene:
         self.model.check(self)
         if self.model.solid:
             support_checks.check_hinges(self)
-        for contact in self.contacts if preformed is None else ():      # after remeshing they have moved
+        for contact in self.contacts if state_transfer is None else ():      # after remeshing they have moved
             contact_checks.check_start(self, contact)
         if heat is not None:
             if not hasattr(heat, "check") or isinstance(heat, type):
@@ -178,14 +177,14 @@ class Scene:
     @property
     def first(self) -> Scene:
         """Scene on the first mesh of a run with remeshing; this scene itself unless remeshing made it."""
-        return self if self.preformed is None else self.preformed.before[0].scene.first
+        return self if self.state_transfer is None else self.state_transfer.before[0].scene.first
 
-    def with_mesh(self, mesh: Mesh, preformed: Any = None, temperature: Any = None) -> Scene:
+    def with_mesh(self, mesh: Mesh, state_transfer: Any = None, temperature: Any = None) -> Scene:
         """Return this scene with another mesh of the body.
 
         Args:
             mesh: the new mesh, with the same names of layers and boundaries.
-            preformed: deformation transferred from the present mesh, or None.
+            state_transfer: deformation transferred from the present mesh, or None.
             temperature: temperature on the new mesh; None for the temperature given to this scene.
 
         Returns:
@@ -196,7 +195,7 @@ class Scene:
         return Scene(mesh=mesh, materials=self.materials, supports=self.supports, loads=self.loads,
                      contacts=self.contacts, model=self.model, kinematics=self.kinematics,
                      quadrature_degree=self.quadrature_degree, heat=self.heat, expansion=self.expansion or None,
-                     thickness=self.thickness or None, preformed=preformed,
+                     thickness=self.thickness or None, state_transfer=state_transfer,
                      temperature=temperature)
 
     @property
@@ -385,9 +384,9 @@ class Scene:
         """
         check_name("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
-        if self.preformed is None:
+        if self.state_transfer is None:
             return found
-        return found._replace(points=self.preformed.original_positions(found.points))
+        return found._replace(points=self.state_transfer.original_positions(found.points))
 
     def shear_modulus(self, layer: str) -> float:
         """Return the small-strain shear modulus of a layer.

@@ -6,11 +6,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..mesh.nodes import COORDINATES, span
+from ..mesh.nodes import COORDINATES, SAME_PLACE, span
 from ..physics.supports import Symmetry
-
-_PLANE_TOLERANCE = 1e-6
-"""Tolerance for nodes in a plane and tools that reach it, over the largest extent of the body."""
 
 _PARTS = {1: "half", 2: "quarter", 3: "eighth"}
 
@@ -144,10 +141,10 @@ def mirror_planes(scene: Any) -> MirrorPlanes:
     Returns:
         The mirror planes.
     """
-    if scene.preformed is not None:
+    if scene.state_transfer is not None:
         return scene.first.symmetry
     mesh, kinematics, found = scene.mesh, scene.kinematics, []
-    body, near = span(mesh.domain, mesh.comm), _PLANE_TOLERANCE * float(max(scene.extent))
+    body, near = span(mesh.domain, mesh.comm), SAME_PLACE * float(max(scene.extent))
     for support in scene.supports:
         if not isinstance(support, Symmetry) or support.guide:
             continue

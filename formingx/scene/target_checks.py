@@ -6,14 +6,13 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..mesh.nodes import SAME_PLACE
 from ..mesh.triangles import Triangles
 from ..physics.supports import Constrained
+from ..values.tolerances import ROUND_OFF
 from .scene import Scene
 
-_BOUNDARY_DISTANCE = 1e-5           # distance over the body's length up to which a point is on a boundary
-_LARGEST_TARGET = 1e9            # largest plausible pressure over shear modulus, or travel over the body's length
 _GRID_SQUARES = 200         # number of squares along a mould's larger side
-_VOLUME_MARGINS = 1.05, 1.005  # largest ratio of a volume to its count in squares, over a flat body and around a tube
 
 
 def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None) -> None:
@@ -101,7 +100,7 @@ def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
     if quantity not in units:
         return None
     what, unit = units[quantity]
-    if abs(value) <= _LARGEST_TARGET * unit:
+    if ROUND_OFF * abs(value) <= unit:                       # beyond it the unit is round-off of the value
         return None
     return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g} (are the units right?)"
 
@@ -112,7 +111,7 @@ def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
     `name` is the name of the target, such as "u_r_at_1_0.5" for u_r at (R, Z) = (1, 0.5).
     """
     component, place = name.removeprefix("u_").split("_at_")
-    point, near = np.array([float(x) for x in place.split("_")]), _BOUNDARY_DISTANCE * max(scene.extent)
+    point, near = np.array([float(x) for x in place.split("_")]), SAME_PLACE * max(scene.extent)
     for support in supports:
         for constraint in scene.kinematics.in_axes(support, support.constraints()):
             if isinstance(constraint, Constrained) and not constraint.driven \
@@ -139,14 +138,14 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
     The volume has the unit length^3, or length^2 in plane strain; it is infinite if the mould is open. For a flat body
     squares outside the tool are counted, if they are connected with the body in the reference configuration.
     """
-    from scipy.ndimage import label
+    from scipy.ndimage import binary_dilation, label
     face = scene.mesh.nodes_of(contact.on)
     if scene.mesh.columns is not None and np.ptp(face[:, 1]) > np.ptp(face[:, 0]):
-        return _mould_volume_of_tube(scene, contact, scene.mesh.line_of(contact.on)), _VOLUME_MARGINS[1]
+        return _mould_volume_of_tube(scene, contact, scene.mesh.line_of(contact.on)), 1 + 1 / _GRID_SQUARES
     low = scene.mesh.nodes_of(scene.driven.on)[:, 1].min()
     edge, top = face.max(0)
     outline = contact.tool.bounds[1]
-    if np.ptp(face[:, 1]) > _BOUNDARY_DISTANCE * edge or face[:, 0].min() > 0 or outline[1] <= top:
+    if np.ptp(face[:, 1]) > SAME_PLACE * edge or face[:, 0].min() > 0 or outline[1] <= top:
         return np.inf, 1.0
     corner = np.maximum(outline, face.max(0))
     size = max(corner[0], corner[1] - low) / _GRID_SQUARES
@@ -159,8 +158,9 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
     inside = (regions == regions[0, 0]) & free
     if inside[-1].any() or inside[:, -1].any():
         return np.inf, 1.0
-    volume = float(size**2 * sum(n * scene.kinematics.weight((R, 0.0)) for R, n in zip(r, inside.sum(1))))
-    return volume, _VOLUME_MARGINS[0]
+    weight = size**2 * np.array([scene.kinematics.weight((R, 0.0)) for R in r])
+    volume, bound = (float(weight @ squares.sum(1)) for squares in (inside, binary_dilation(inside)))
+    return volume, bound / volume
 
 
 def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
@@ -177,7 +177,7 @@ def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]
     (r, top), (low, width) = line[-1], (contact.tool.bounds[0, 1], contact.tool.bounds[1, 0])
-    if line[0, 0] > _BOUNDARY_DISTANCE * width or width < r or low > line[0, 1]:
+    if line[0, 0] > SAME_PLACE * width or width < r or low > line[0, 1]:
         return np.inf
     n = int(np.ceil(_GRID_SQUARES * (top - low) / max(width, top - low)))
     size = (top - low) / n

@@ -9,14 +9,10 @@ from ..mesh.nodes import facet_node_positions
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
 from ..ranks import gathered
-
-_DIRECTIONS = 90           # number of directions in which the width of a closed tool is measured
+from ..values.tolerances import PIECE_POINTS
 
 CUT = 0.1
 """Largest allowed penetration of a tool between contact points, over the thickness of the body."""
-
-_EDGE_POINTS = 33
-"""Number of points of an element edge at which the penetration is computed."""
 
 _MAX_MOVES = 200
 """Largest number of moves of a tool towards a face."""
@@ -45,11 +41,12 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 
     `ends` are the end points of the element edges of the face, shape (n, 2, 2), length.
     """
+    from scipy.spatial import ConvexHull
     outline = contact.tool.surface()[0]
     if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # its other half
         outline = np.concatenate([outline, outline * (-1, 1)])
-    angles = np.linspace(0, np.pi, _DIRECTIONS, endpoint=False)
-    width = float(np.ptp(outline @ np.array([np.cos(angles), np.sin(angles)]), axis=0).min())
+    normals = ConvexHull(outline).equations[:, :2]          # the smallest width is across an edge of the hull
+    width = float(np.ptp(outline @ normals.T, axis=0).min())
     nearest = ends[np.argmax(contact.tool.signed_distance(ends.mean(1)))]
     points = 2 if contact.points == "nodes" else int(contact.points)
     edge = float(np.hypot(*(nearest[1] - nearest[0])))
@@ -74,7 +71,7 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
     fractions = np.array([0.0, 0.5, 1.0]) if contact.points == "nodes" else (
         np.polynomial.legendre.leggauss(int(contact.points))[0] + 1) / 2
     points, places = (ends[:, :1] + s[:, None] * (ends[:, 1:] - ends[:, :1])
-                      for s in (fractions, np.linspace(0, 1, _EDGE_POINTS)))
+                      for s in (fractions, np.linspace(0, 1, PIECE_POINTS)))
     travel, furthest = 0.0, 2 * (tool.size + float(np.ptp(ends, axis=(0, 1)).max()))
     for _ in range(_MAX_MOVES):
         gap = -float(tool.signed_distance(points.reshape(-1, points.shape[-1]) - travel * way).max())

@@ -6,10 +6,9 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError
+from ..values.tolerances import CURVE_POINTS
 from .pieces import Arc, Line
 
-_MAX_HALVINGS = 14     # largest number of halvings of a curve
-_MAX_ARCS = 2000       # largest number of arcs for one curve
 _MIN_TOLERANCE = 1e-7  # smallest tolerance over the size of a curve
 
 
@@ -31,7 +30,7 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
                          f" {_MIN_TOLERANCE * size:.3g}")
     made = 0
 
-    def between(low: float, high: float, depth: int) -> list[Line | Arc]:
+    def between(low: float, high: float) -> list[Line | Arc]:
         nonlocal made
         points, derivatives = curve(np.linspace(low, high, 17))
         lengths = np.hypot(*derivatives.T)
@@ -41,12 +40,13 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
         if found and np.min([_distance_to(points, piece) for piece in found], axis=0).max() <= tolerance:
             made += len(found)
             return found
-        if depth == _MAX_HALVINGS or made > _MAX_ARCS:
-            raise InputError(f"{name}: {_MAX_ARCS} arcs, or one 2^{_MAX_HALVINGS} times shorter, are not within"
+        # a corner is still farther away from a piece so short than the tolerance
+        if size * (high - low)**1.5 < tolerance or made > CURVE_POINTS:
+            raise InputError(f"{name}: {CURVE_POINTS} arcs, or one of {high - low:.2g} of the curve, are not within"
                              f" tolerance = {tolerance:g} of it")
         middle = (low + high) / 2
-        return between(low, middle, depth + 1) + between(middle, high, depth + 1)
-    return between(0.0, 1.0, 0)
+        return between(low, middle) + between(middle, high)
+    return between(0.0, 1.0)
 
 
 def in_plane(points: np.ndarray, name: str) -> np.ndarray:
@@ -81,7 +81,7 @@ def piece_through(points: np.ndarray, name: str) -> Line | Arc:
     """
     if not np.all(np.isfinite(points)):
         raise InputError(f"{name}: its coordinates are not all finite numbers")
-    n, tolerance = len(points), 1e-7 * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
+    n, tolerance = len(points), _MIN_TOLERANCE * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
     a, b = points[[0, -1]] if n > 1 else (np.zeros(2), np.zeros(2))
     chord = b - a
     distance = (points - a) @ (-chord[1], chord[0]) / max(math.hypot(*chord), tolerance)

@@ -11,7 +11,6 @@ import sys
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
-from threading import Timer
 from typing import Any
 
 import numpy as np
@@ -23,7 +22,6 @@ from .pieces import Arc, Line
 
 _BASE_SECONDS = 10               # computing time allowed for a file, s
 _BYTES_PER_SECOND = 50_000  # size of a file that adds one second, bytes
-_CLOCK_FACTOR = 20          # allowed elapsed over computing time: the machine may be busy
 
 
 def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
@@ -66,8 +64,6 @@ class _Reader:
         self._process = subprocess.Popen(
             [sys.executable, "-P", cad_process.__file__, file, kind, str(self._seconds)], env=environment, text=True,
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
-        self._timer = Timer(_CLOCK_FACTOR * self._seconds, self._process.kill)
-        self._timer.start()
 
     def __enter__(self) -> _Reader:
         """Wait until the process has read the file, set `bounds`, and return the reader."""
@@ -80,7 +76,6 @@ class _Reader:
 
     def __exit__(self, *_: Any) -> None:
         """End the process."""
-        self._timer.cancel()
         self._process.kill()
         self._process.communicate()
 

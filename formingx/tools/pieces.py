@@ -8,9 +8,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, pair, positive
+from ..values.tolerances import ROUND_OFF
 
-FLAT = 1e-9
-"""Angle between two successive pieces below which their joint is smooth, radians."""
 TURN = 2 * math.pi
 """Angle of a full circle, radians."""
 
@@ -93,7 +92,7 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
     edges = [(i, (i + 1) % n) for i in range(n if closed else n - 1)]
     lengths = {e: math.dist(points[e[0]], points[e[1]]) for e in edges}
     for (i, j), length in lengths.items():
-        if length <= 1e-9 * size:
+        if length <= ROUND_OFF * size:
             raise InputError(f"Tool: points {i} and {j} are the same, {text(points[i])}")
     angle = {e: math.atan2(*(points[e[1]] - points[e[0]])[::-1]) for e in edges}
     before = {j: (i, j) for i, j in edges}
@@ -105,12 +104,12 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
         outgoing = angle[after[i]] if i in after else None
         incoming = angle[before[i]] if i in before else None
         if outgoing is None or incoming is None:
-            if abs(points[i][0]) > 1e-9 * size:
+            if abs(points[i][0]) > ROUND_OFF * size:
                 raise InputError(f"Tool: fillet at point {i} = {radius!r}: an open end has no corner to round")
             outgoing, incoming = (-incoming if outgoing is None else outgoing,             # type: ignore[operator]
                                   -outgoing if incoming is None else incoming)             # type: ignore[operator]
         turn = turn_angle(incoming, outgoing)
-        if abs(turn) < FLAT:
+        if abs(turn) < ROUND_OFF:
             if each:
                 raise InputError(f"Tool: fillet at point {i} = {radius!r}: the profile runs straight on there: it has"
                                  f" no corner to round")
@@ -121,7 +120,7 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
     pieces: list[Line | Arc] = [arcs[0]] if 0 in arcs and not closed else []
     for i, j in edges:
         direction = (points[j] - points[i]) / lengths[i, j]
-        if lengths[i, j] - cut[i] - cut[j] > 1e-9 * size:
+        if lengths[i, j] - cut[i] - cut[j] > ROUND_OFF * size:
             pieces.append(Line(points[i] + cut[i] * direction, points[j] - cut[j] * direction))
         if j in arcs:
             pieces.append(arcs[j])
@@ -161,7 +160,7 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
         InputError: two fillets are together longer than their edge.
     """
     for (i, j), length in lengths.items():
-        if cut[i] + cut[j] > length * (1 + 1e-9):
+        if cut[i] + cut[j] > length * (1 + ROUND_OFF):
             k = i if cut[i] >= cut[j] else j
             raise InputError(f"Tool: fillet at point {k} = {radii[k]:g} is too large for its corner {text(points[k])}:"
                              f" the edge from {text(points[i])} to {text(points[j])} is {length:.6g} long and its"
@@ -186,7 +185,7 @@ def checked(piece: Line | Arc, i: int) -> Line | Arc:
     centre = np.array(pair(f"{caller}: centre", piece.centre))
     arc = Arc(centre, positive(f"{caller}: radius", piece.radius), finite(f"{caller}: start", piece.start),
               finite(f"{caller}: sweep", piece.sweep))
-    if not 1e-9 < abs(arc.sweep) <= TURN * (1 + 1e-12):
+    if not ROUND_OFF < abs(arc.sweep) <= TURN * (1 + 1e-12):
         raise InputError(f"{caller}: sweep = {arc.sweep!r}: must be an angle in radians, not 0, at most a full turn")
     return arc
 

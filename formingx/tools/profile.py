@@ -15,8 +15,9 @@ import numpy as np
 from .._jit import address
 from ..errors import InputError, as_list, as_points, check_type, finite, non_negative, pair
 from ..mesh.boxes import overlapping
+from ..values.tolerances import ROUND_OFF
 from .nearest import nearest
-from .pieces import FLAT, TURN, Arc, Line, checked, number_of_chords, rounded, sampled, text, turn_angle
+from .pieces import TURN, Arc, Line, checked, number_of_chords, rounded, sampled, text, turn_angle
 
 
 class Nearest(NamedTuple):
@@ -228,7 +229,7 @@ class Tool:
     def _tabulate(self) -> None:
         """Store the table of pieces for `nearest`: lines, then arcs and sharp corners (arcs of radius 0)."""
         rows, arcs = [], []     # origin, direction, sense (0: line), lowest and highest coordinate; arcs: radius, start
-        tol = 1e-9 * self.size
+        tol = ROUND_OFF * self.size
         ends = self._ends()
         for i, p in enumerate(self.pieces):
             opens = (i == 0 and ends[0] is None, i == len(self.pieces) - 1 and ends[1] is None)
@@ -237,16 +238,16 @@ class Tool:
                 rows.append((*p.a, *(p.b - p.a) / length, 0.0, -math.inf if opens[0] else -tol,
                              math.inf if opens[1] else length + tol))
             else:
-                full, sign = abs(p.sweep) >= TURN - FLAT, math.copysign(1.0, p.sweep)
-                start = p.start - sign * (math.pi / 2 * opens[0] + FLAT)
+                full, sign = abs(p.sweep) >= TURN - ROUND_OFF, math.copysign(1.0, p.sweep)
+                start = p.start - sign * (math.pi / 2 * opens[0] + ROUND_OFF)
                 sweep = abs(p.sweep) + math.pi / 2 * (opens[0] + opens[1])
                 arcs.append((*p.centre, 0.0, 0.0, sign, 0.0,
-                             math.inf if full or sweep >= TURN else sweep + 2 * FLAT, p.radius, start))
+                             math.inf if full or sweep >= TURN else sweep + 2 * ROUND_OFF, p.radius, start))
         joints = list(zip(self.pieces, self.pieces[1:] + (self.pieces[:1] if self.closed else ())))
         corners = [(p.ends[1], turn_angle(p.angles[1], q.angles[0])) for p, q in joints]
         corners += [end for end in ends if end is not None]
         arcs += [(*c, 0.0, 0.0, math.copysign(1.0, turn), 0.0, math.inf, 0.0, 0.0)
-                 for c, turn in corners if abs(turn) > FLAT]
+                 for c, turn in corners if abs(turn) > ROUND_OFF]
         self.lines = len(rows)
         self.table = np.array([(*row, 0.0, 0.0) for row in rows] + arcs)
 
@@ -262,9 +263,10 @@ class Tool:
         found = []
         for point, angle, last in ((self.pieces[0].ends[0], self.pieces[0].angles[0], False),
                                    (self.pieces[-1].ends[1], self.pieces[-1].angles[1], True)):
-            on_axis = abs(point[0]) < 1e-9 * self.size
+            on_axis = abs(point[0]) < ROUND_OFF * self.size
             turn = turn_angle(angle, -angle) if last else turn_angle(-angle, angle)
-            found.append((point, turn) if on_axis and abs(turn) > FLAT and abs(abs(turn) - math.pi) > FLAT else None)
+            slanted = abs(turn) > ROUND_OFF and abs(abs(turn) - math.pi) > ROUND_OFF
+            found.append((point, turn) if on_axis and slanted else None)
         return tuple(found)
 
     def _check_crossing(self) -> None:
@@ -276,7 +278,7 @@ class Tool:
         parts = [sampled(p, number_of_chords(p)) for p in self.pieces]
         a = np.concatenate([part[:-1] for part in parts])
         b = np.concatenate([part[1:] for part in parts])
-        tolerance, n = 1e-9 * self.size, len(a)
+        tolerance, n = ROUND_OFF * self.size, len(a)
         closes = self.closed or math.dist(a[0], b[-1]) < tolerance
         for i, j in overlapping(np.minimum(a, b) - tolerance, np.maximum(a, b) + tolerance):
             i, j = np.minimum(i, j), np.maximum(i, j)

@@ -5,8 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError, finite, positive, values
-
-_MAX_POINTS = 2000  # a discontinuous or noisy function needs more
+from .tolerances import CURVE_POINTS
 
 
 def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance: float = 1e-3,
@@ -38,7 +37,7 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
         raise InputError(f"amplitude: until = {until:g}: must be after start = {start:g}")
     t = np.linspace(start, until, 9)
     f = _evaluate(function, t)
-    while len(t) <= _MAX_POINTS:
+    while len(t) <= CURVE_POINTS:
         middle = (t[:-1] + t[1:]) / 2
         samples = _evaluate(function, middle)
         bent = np.abs(samples - (f[:-1] + f[1:]) / 2) > tolerance * max(np.ptp(np.append(f, samples)), 1e-300)
@@ -47,7 +46,7 @@ def amplitude(function: Callable, until: float, start: float = 0.0, *, tolerance
         t, f = np.append(t, middle[bent]), np.append(f, samples[bent])
         order = np.argsort(t)
         t, f = t[order], f[order]
-    raise InputError(f"amplitude: the function is not smooth near t = {middle[bent][0]:.6g}: {_MAX_POINTS} points do"
+    raise InputError(f"amplitude: the function is not smooth near t = {middle[bent][0]:.6g}: {CURVE_POINTS} points do"
                      f" not follow it to {tolerance:g} of its range: give Stage a table")
 
 

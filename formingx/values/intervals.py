@@ -4,6 +4,9 @@ from collections.abc import Mapping
 
 from ..errors import fraction
 
+UNDETERMINED = 0.5
+"""Standard error, over the value of a constant or half the range of a parameter, from which data leave it open."""
+
 
 def t_intervals(constants: Mapping[str, float], errors: Mapping[str, float], points: int, confidence: float
                 ) -> dict[str, tuple[float, float]]:

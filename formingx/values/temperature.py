@@ -1,5 +1,6 @@
 """Functions of the temperature, and time-temperature superposition."""
 
+import math
 from collections.abc import Callable
 from typing import Any
 
@@ -9,13 +10,12 @@ from numpy.typing import ArrayLike
 
 from ..errors import InputError, check_name, finite, positive, values
 from .table import Table
+from .tolerances import FAR
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
 """{unit of temperature: absolute zero in this unit}."""
 EVERYWHERE = (-np.inf, np.inf)
 """Lowest and highest temperature of a function that is known at all temperatures."""
-_MAX_LOG_SHIFT = 30.0
-"""log10 of the shift factor above which a material counts as elastic."""
 GAS_CONSTANT = 8.31446261815324
 """Molar gas constant, J/(mol K)."""
 
@@ -92,7 +92,7 @@ class WLF:
     def __init__(self, c1: float, c2: float, reference: float):
         self.c1, self.c2 = positive("WLF: c1", c1), positive("WLF: c2", c2)
         self.reference = finite("WLF: reference", reference)
-        self.limits = self.reference - self.c2 + self.c1 * self.c2 / (_MAX_LOG_SHIFT + self.c1), np.inf
+        self.limits = self.reference - self.c2 + self.c1 * self.c2 / (math.log10(FAR) + self.c1), np.inf
 
     def __call__(self, temperature: ArrayLike) -> Any:
         """Return the shift factor aT at temperatures, of their shape.

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, positive
+from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.mesh import Columns, Mesh
 from ...mesh.sizes import GROWTH, ends_of_columns, moved_nodes, number_of_columns
 from .column_factors import column_factors
@@ -18,8 +19,6 @@ _SHORTEST = 1 / 8
 _COLUMN_SAMPLES = 16
 """Number of sampling points of a column for sizes."""
 
-_MAX_COLUMNS = 20_000
-"""Largest number of columns of a new mesh."""
 
 
 def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | None = None) -> Mesh:
@@ -142,7 +141,7 @@ def _new_ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     distance = np.maximum(np.maximum(joints[:-1] - s[:, None], s[:, None] - joints[1:]), 0.0)
     size = (requested + GROWTH * distance).min(1)
     number = number_of_columns(s, size)[-1]
-    if number > _MAX_COLUMNS:
+    if number > MAX_RECTANGLES:
         raise InputError(f"adapted: max_rotation and error ask for {number:.3g} elements along the sheet, at most"
-                         f" {_MAX_COLUMNS} are allowed: make max_rotation or error larger")
+                         f" {MAX_RECTANGLES} are allowed: make max_rotation or error larger")
     return ends_of_columns(samples, s, size, np.union1d(columns.fixed, old[[0, -1]]))

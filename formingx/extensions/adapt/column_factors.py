@@ -10,9 +10,7 @@ from ...errors import InputError, positive
 from ...forms.outline import FINE_PIECES, Outline, edge_points
 from ...results.extend import method_of
 from ...results.path import Path
-
-_EXAMINED_STATES = 12
-"""Number of states whose stresses are examined, evenly spaced."""
+from ...values.tolerances import EXAMINED_STATES
 
 _FILLET_GAP = 0.25
 """Gap over the fillet radius up to which a face lies on the fillet: the gap of a chord of 80 degrees."""
@@ -155,7 +153,7 @@ def _factors_by_stress_error(path: Any, error: float, middles: np.ndarray) -> np
         path.problem.scene.mesh.columns.ends)[[0, -1]], axis=1), axis=2).mean(0)
     found = np.full(n, np.inf)
     states = [state for state in path.states if state.kind != "start"]
-    examined = np.unique(np.linspace(0, len(states) - 1, _EXAMINED_STATES).astype(int))
+    examined = np.unique(np.linspace(0, len(states) - 1, EXAMINED_STATES).astype(int))
     for state in (states[k] for k in examined):
         estimate = path.stress(state).error()
         squares = np.bincount(_nearest_column(estimate.points, middles), estimate.cells**2, n)

@@ -14,9 +14,8 @@ from ...errors import InputError, as_list, check_name, check_type
 from ...io import csv_files
 from ...results import files
 from ...results.show import plots
+from ...values.tolerances import FAR
 from .curves import SampledCurve, arc_length, pair_at_equal_values, pair_in_order, ranges, resolution_of
-
-_MAX_RANGE_RATIO = 1e100                   # largest ratio of the two ranges: its square stays finite
 
 
 @dataclass(frozen=True)
@@ -192,7 +191,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     for name, size, other in zip(names, scale, ranges(b)):
         if not size > 0 or not other > 0:
             raise InputError(f"compare: column {name!r} does not vary on {'our' if not size > 0 else 'their'} side")
-        if not min(size, other) > max(size, other) / _MAX_RANGE_RATIO:
+        if not min(size, other) > max(size, other) / FAR:      # the square of the ratio stays finite
             raise InputError(f"compare: column {name!r}: ours changes by {size:.3g}, theirs by {other:.3g}: no curves"
                              f" to compare; are columns and units right?")
     curve = np.column_stack(ours.curve(*names)) if hasattr(ours, "curve") else a
@@ -218,7 +217,7 @@ def _percent(share: float) -> str:
     return f"{f'{100 * share:.2g} %':>10}"
 
 
-def _table(side: str, given: Any) -> csv_files.Table:
+def _table(side: str, given: Any) -> csv_files.CsvTable:
     """Return one side of a comparison as a table.
 
     Args:
@@ -233,7 +232,7 @@ def _table(side: str, given: Any) -> csv_files.Table:
     return csv_files.from_arrays(side, given) if isinstance(given, Mapping) else csv_files.read(given)
 
 
-def _columns(left: csv_files.Table, right: csv_files.Table, given: Any) -> dict[str, str]:
+def _columns(left: csv_files.CsvTable, right: csv_files.CsvTable, given: Any) -> dict[str, str]:
     """Return the columns to compare, {our name: their name}, checked.
 
     Args:
@@ -314,7 +313,8 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
                       float(np.sqrt(np.average(values**2, weights=weights))))
 
 
-def _limit_points(table: csv_files.Table, points: np.ndarray, names: list[str], control: str) -> list[dict[str, float]]:
+def _limit_points(table: csv_files.CsvTable, points: np.ndarray, names: list[str], control: str
+                  ) -> list[dict[str, float]]:
     """Return the limit points of a curve, each as {column: value}.
 
     These are the states that a run marks as limit points. For other tables they are the turning points of parabolas

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...values.tolerances import CURVE_POINTS, PIECE_POINTS
 
-_CURVE_SAMPLES = 2000                    # samples of a curve over its arc length
-_PIECE_POINTS = 33                         # points of the two pieces of the curve that meet at a sample
 _MAX_POINTS = 10_000                     # largest number of points to pair: each is compared with every sample
 
 
@@ -61,7 +60,7 @@ class SampledCurve:
         advances = np.concatenate([[True], np.diff(s) > 0])
         points, s = points[advances], s[advances]
         self.evaluate = Akima1DInterpolator(s, points, axis=0) if len(points) > 3 else interp1d(s, points, axis=0)
-        self.arc_lengths = np.linspace(0, s[-1], _CURVE_SAMPLES)
+        self.arc_lengths = np.linspace(0, s[-1], CURVE_POINTS)
         self.line = self.evaluate(self.arc_lengths)
 
     def closest_point(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
@@ -74,8 +73,8 @@ class SampledCurve:
         Returns:
             The closest point of the curve, shape (c,); True if `point` lies beyond an end of the curve.
         """
-        low, high = max(k - 1, 0), min(k + 1, _CURVE_SAMPLES - 1)
-        line = self.evaluate(np.linspace(self.arc_lengths[low], self.arc_lengths[high], _PIECE_POINTS))
+        low, high = max(k - 1, 0), min(k + 1, CURVE_POINTS - 1)
+        line = self.evaluate(np.linspace(self.arc_lengths[low], self.arc_lengths[high], PIECE_POINTS))
         d = np.diff(line, axis=0)
         t = ((point - line[:-1]) * d).sum(1) / (d * d).sum(1)
         closest = line[:-1] + np.clip(t, 0, 1)[:, None] * d
@@ -83,7 +82,7 @@ class SampledCurve:
         overshoot = 0.0
         if low == 0 and j == 0:
             overshoot = -t[j]
-        elif high == _CURVE_SAMPLES - 1 and j == len(t) - 1:
+        elif high == CURVE_POINTS - 1 and j == len(t) - 1:
             overshoot = t[j] - 1
         beyond = float(overshoot * np.linalg.norm(d[j]))
         distance = float(np.linalg.norm(point - line[j] - t[j] * d[j]))

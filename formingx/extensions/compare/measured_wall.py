@@ -15,8 +15,6 @@ from ...io.csv_files import read
 from ...results import files
 from ...results.path import Path
 
-_REPORTED_DISTANCE = 1.0
-"""Distance of a measured point from the computed middle line, over the wall there, above which the table shows it."""
 _MAX_OVERHANG = 0.1
 """Distance of a measured point beyond the end of the computed part, over its length, up to which it is accepted."""
 _WALL = ("wall", "thickness", "wall_thickness")
@@ -209,7 +207,7 @@ class WallComparison:
     def __str__(self) -> str:
         lines = [f"{'length':>10}{'measured':>12}{'computed':>12}{'deviation':>12}"]
         lines += [f"{s:10.4g}{m:12.4g}{c:12.4g}{d:+11.1f} %" + (f"   {a:.3g} off the computed section" * bool(
-            a > _REPORTED_DISTANCE * c)) for s, m, c, d, a in zip(
+            a > c)) for s, m, c, d, a in zip(
                 self.length, self.measured, self.computed, self.deviation_percent, self.distance)]
         worst = int(np.abs(self.deviation_percent).argmax())
         return "\n".join([*lines, f"mean {self.mean_percent:+.1f} %, root mean square {self.rms_percent:.1f} %, largest"

@@ -20,8 +20,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ...contact.gap_closures import crossing, gap_closures
-from ...physics.contact_law import FAR, ContactStatus
+from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
+from ...values.tolerances import FAR
 from .gap_closure import GapClosure
 from .reduced_contact import Points, ToolFrame
 from .response import Response

@@ -27,8 +27,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ..._jit import address, address_of_integers
-from ...physics.contact_law import FAR, ContactStatus
+from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
+from ...values.tolerances import FAR
 from .compiled_contact import compiled
 from .gap_closure import GapClosure
 from .response import Response

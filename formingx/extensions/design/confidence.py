@@ -8,10 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...values.intervals import t_intervals
+from ...values.intervals import UNDETERMINED, t_intervals
 
-_UNDETERMINED = 0.25
-"""Standard error over the range of a parameter above which the wall leaves it undetermined."""
 _INDISTINGUISHABLE = 0.9
 """Correlation above which two undetermined parameters cannot be distinguished."""
 
@@ -68,7 +66,7 @@ class Confidence:
 
         Their standard error exceeds a quarter of their range.
         """
-        return [name for (name, error), size in zip(self.errors.items(), self.sizes) if error > _UNDETERMINED * size]
+        return [name for (name, error), size in zip(self.errors.items(), self.sizes) if error > UNDETERMINED * size / 2]
 
     @property
     def indistinguishable(self) -> list[tuple[str, str, float]]:

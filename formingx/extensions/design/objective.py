@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, finite, pair, values
+from ...values.tolerances import MEASURED_ACCURACY, NOTICEABLE
 from .run import DesignRun
 
 
@@ -18,12 +19,10 @@ class SearchSettings:
     Attributes:
         volume_weight: weight of the relative deviation of a prescribed volume; deviations of the wall have weight 1.
         volume_margin: relative reduction of the first run's volume as a target, so that round-off does not exceed it.
-        tolerance: relative deviation of the volume or the minimum wall above which the result reports it.
-        wall_tolerance: largest relative deviation of the wall up to which the wanted wall counts as reached.
         limiting_share: a bound or the prescribed volume is named as the reason of a deviation of the wall if it makes
             most of it. Removed from the search, it would leave a deviation below this share of the present one.
-        damping: Levenberg damping over the largest singular value of the sensitivities.
-        damping_measured: the same for the fit to a measured wall, which contains scatter.
+        damping: Levenberg damping over the largest singular value of the sensitivities; for a measured wall, which
+            contains scatter, it is `MEASURED_ACCURACY`.
         min_improvement: smallest relative decrease of the cost. The search ends after two runs that each decrease it by
             less, or before a step for which the derivatives predict less.
         shortest_step: smallest part of a step that is tried, after halving a step that brought no improvement.
@@ -31,11 +30,8 @@ class SearchSettings:
 
     volume_weight: float = 1e2
     volume_margin: float = 1e-6
-    tolerance: float = 5e-3
-    wall_tolerance: float = 0.01
     limiting_share: float = 0.8
     damping: float = 1e-6
-    damping_measured: float = 1e-2
     min_improvement: float = 0.02
     shortest_step: float = 1 / 64
 
@@ -54,7 +50,7 @@ def missed_target(what: str, requested: float | None, found: float) -> str:
     Returns:
         Text with the target and the value found; "" if they agree to 0.5 %, or there is no target.
     """
-    if requested is None or abs(found / requested - 1) < SETTINGS.tolerance:
+    if requested is None or abs(found / requested - 1) < NOTICEABLE:
         return ""
     return f"the {what} that was asked for, {requested:.5g}, was not reached: {found:.5g}"
 
@@ -167,7 +163,7 @@ class WallObjective:
         wall = run.wall[self.inside]
         deviation = wall / self.target_wall - 1
         worst = int(np.argmax(np.abs(deviation)))
-        if abs(deviation[worst]) < SETTINGS.wall_tolerance:
+        if abs(deviation[worst]) < MEASURED_ACCURACY:
             return ""
         s = run.profile.reference_length[self.inside]
         return (f"the wanted wall was not reached: wanted {_range(self.target_wall)}, reached {_range(wall)}; the"
@@ -214,7 +210,7 @@ class MeasuredWallObjective(WallObjective):
         volume: prescribed reference volume, length^3, or None.
     """
 
-    damping = SETTINGS.damping_measured
+    damping = MEASURED_ACCURACY
 
     def __init__(self, run: DesignRun, measured: Any, volume: float | None):
         super().__init__(run, None, None, volume)

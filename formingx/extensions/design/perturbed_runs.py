@@ -23,8 +23,9 @@ import numpy as np
 
 from ...errors import InputError
 from ...problem.problem import Problem
-from ...solve.newton import Failure
+from ...solve.newton import Failure, Tolerances
 from ...solve.state import State
+from ...values.tolerances import ROUND_OFF
 
 
 @dataclass(frozen=True)
@@ -34,17 +35,13 @@ class PerturbedTolerances:
     The criterion is the Newton correction of (x, control) over the distance of the perturbed state from the base state.
 
     Attributes:
-        tolerance: tolerance without contact.
-        tolerance_in_contact: tolerance with contact.
+        tolerance_in_contact: tolerance with contact; without, it is `ROUND_OFF`.
         last_tolerance: tolerance after the last iteration; above it the perturbed run fails.
-        iterations: maximum number of iterations.
         round_off: correction over the norm of the base state up to which it counts as round-off.
     """
 
-    tolerance: float = 1e-9
     tolerance_in_contact: float = 1e-5
     last_tolerance: float = 1e-3
-    iterations: int = 12
     round_off: float = 2e-13
 
 
@@ -218,9 +215,9 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
                 run.control - state.control))
         return run.constraint(equations[k]) - residual
     size = _norm(problem, state.x) + abs(state.control)
-    tolerance = _TOLERANCES.tolerance_in_contact if problem.has_kinks else _TOLERANCES.tolerance
+    tolerance = _TOLERANCES.tolerance_in_contact if problem.has_kinks else ROUND_OFF
     active, first = list(range(len(perturbed))), np.full(len(perturbed), np.inf)
-    for iteration in range(_TOLERANCES.iterations):
+    for iteration in range(Tolerances.iterations):
         rows = np.column_stack([perturbed[k].residual(base_residual) for k in active])
         violations = np.array([constraint(k) for k in active])
         if len(active) > 1:
@@ -239,7 +236,7 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
                 run.x, run.control = run.x + dx[:, column], run.control + steps[column]
             distance = _norm(problem, run.x - state.x) + abs(run.control - state.control)
             failed = correction > max(_TOLERANCES.last_tolerance * distance, 10 * _TOLERANCES.round_off * size)
-            if not np.isfinite(correction) or iteration == _TOLERANCES.iterations - 1 and failed:
+            if not np.isfinite(correction) or iteration == Tolerances.iterations - 1 and failed:
                 raise PerturbedRunFailure(f"with {run.name} a little changed no state is found near", [])
             first[k] = correction if iteration == 0 else first[k]
             converged &= correction <= max(tolerance * distance, _TOLERANCES.round_off * size)

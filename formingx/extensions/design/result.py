@@ -12,11 +12,9 @@ import numpy as np
 from ...errors import InputError
 from ...findings import without_notes
 from ...units import NONE, Units
+from ...values.tolerances import NEGLIGIBLE
 from .confidence import Confidence, confidence
 from .run import DesignRun
-
-_WALL_SCATTER = 6e-5
-"""Relative scatter of the wall between runs that take different steps."""
 
 
 def unevenness(wall: np.ndarray) -> float:
@@ -104,15 +102,15 @@ class DesignResult:
     def without_effect(self) -> list[str]:
         """Return the names of the parameters without effect on the wall.
 
-        By the derivatives of the first run, the whole range of such a parameter changes the wall by less than 6e-5 of
-        its mean. Walls of runs with different steps scatter by as much.
+        By the derivatives of the first run, the whole range of such a parameter changes the wall by less than 0.1 % of
+        its mean.
 
         Returns:
             Names of the parameters.
         """
         jacobian = self.before.derivative("wall")[1][self.inside] * self.before.parameters.size
         mean = self.before.wall[self.inside].mean()
-        return [name for name, d in zip(self.before.parameters.names, abs(jacobian).max(0) / mean) if d < _WALL_SCATTER]
+        return [name for name, d in zip(self.before.parameters.names, abs(jacobian).max(0) / mean) if d < NEGLIGIBLE]
 
     def attainable(self) -> float:
         """Return the lowest unevenness of the wall that the parameters can reach within their bounds, for any volume.

@@ -18,19 +18,17 @@ from ...solve.arc_length import Curve
 from ...solve.newton import Failure, Tolerances
 from ...solve.record import Record
 from ...units import NONE, Units
+from ...values.tolerances import DIFFERENCE_STEP
 from . import scatter
 from .parameters import Parameters
 from .perturbed_paths import trace_perturbed
 from .perturbed_runs import PerturbedRun, PerturbedRunFailure
 from .scatter import Band
 
-_SMOOTH_CHANGE = 1e-5
-"""Relative change of a parameter without contact: one perturbed run above, one below."""
+_CONTACT_CHANGE = 1e-8
+"""Relative change of a parameter with contact, to one side; a tenth and a hundredth of it are tried next.
 
-_CONTACT_CHANGES = (1e-8, 1e-9, 1e-10)
-"""Relative changes of a parameter with contact, to one side, tried in order until all perturbed runs converge.
-
-Contact acts within a thin ramp. The changes are so small that a one-sided difference is accurate.
+Contact acts within a thin ramp. The change is so small that a one-sided difference is accurate.
 """
 
 
@@ -145,7 +143,7 @@ class DesignRun:
         With contact there is one perturbed run for each parameter, and the difference is between it and this run.
         """
         contact, reason = bool(self.path.problem.contacts), ""
-        for size in _CONTACT_CHANGES if contact else (_SMOOTH_CHANGE,):
+        for size in [_CONTACT_CHANGE / 10**k for k in range(3)] if contact else [DIFFERENCE_STEP]:
             perturbed_runs = []
             for k, step in enumerate(size * self.parameters.size):
                 signs = (-1.0 if self.vector[k] + step > self.parameters.high[k] else 1.0,) if contact else (1.0, -1.0)

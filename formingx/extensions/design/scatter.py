@@ -35,7 +35,7 @@ class Band:
     coordinates: np.ndarray
     value: np.ndarray
     deviation: np.ndarray
-    confidence: float = 0.95
+    confidence: float
 
     @property
     def low(self) -> np.ndarray:

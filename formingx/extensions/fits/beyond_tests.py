@@ -16,9 +16,8 @@ from ...forms.transfer import isochoric_gradients
 from ...mesh.nodes import COORDINATES
 from ...mesh.triangles import place
 from ...ranks import gathered
+from ...values.tolerances import NOTICEABLE
 from .tested import MeasuredRange, nearest_test, principal_strains
-
-_MAX_UNTESTED_VOLUME = 0.005             # share of a layer's volume that may lie outside the tests without a warning
 
 
 @register("scene")
@@ -64,7 +63,7 @@ def strains_beyond_tests(path: Any) -> Iterator[Finding]:
             strains, points, volumes = _deformation(problem, terms)
         outside = tested.outside(strains)
         share = float(volumes[outside].sum() / volumes.sum())
-        if share < _MAX_UNTESTED_VOLUME:
+        if share < NOTICEABLE:
             continue
         furthest = int(np.argmax(np.where(outside, tested.distance(strains), 0.0)))
         largest, middle = strains[furthest]

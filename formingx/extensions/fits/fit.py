@@ -25,8 +25,6 @@ from .weights import numbered_weights
 _FIRST_EVALUATIONS = 20
 """Largest number of evaluations of the residual from each first guess."""
 
-_LAST_EVALUATIONS = 400
-"""Largest number of evaluations from each of the best three results, to refine them."""
 
 IN_TIME: list[tuple[type, Callable]] = [(GeneralisedMaxwell, fit_timed_tests)]
 """Classes of materials that are fitted to tests in time, each with the function that fits it."""
@@ -236,7 +234,7 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
     if len(measured) < n:
         raise InputError(f"fit: {len(measured)} points cannot fix the {n} constants of {type(guesses[0]).__name__}")
 
-    def refined(guess: Material, start: Any, evaluations: int) -> tuple[float, Material, np.ndarray]:
+    def refined(guess: Material, start: Any, evaluations: int | None) -> tuple[float, Material, np.ndarray]:
         """Return (cost, guess, fitted coordinates of the constants) after a least-squares fit.
 
         The cost is infinite if the stress of the guess is not finite at some stretch.
@@ -244,7 +242,7 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
         Args:
             guess: material whose class and coordinates are fitted.
             start: coordinates of the constants from which the fit starts, shape (constants,).
-            evaluations: largest number of evaluations of the stresses.
+            evaluations: largest number of evaluations of the stresses; None: 100 for each constant.
         """
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 
@@ -264,7 +262,7 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
         return trial[0]
 
     trials = sorted((refined(g, [x for x, *_ in g.coordinates()], _FIRST_EVALUATIONS) for g in guesses), key=cost)
-    lowest_cost, guess, x = min((refined(g, x, _LAST_EVALUATIONS) for _, g, x in trials[:3]), key=cost)
+    lowest_cost, guess, x = min((refined(g, x, None) for _, g, x in trials[:3]), key=cost)
     if not np.isfinite(lowest_cost):
         raise InputError(f"fit: {guess} has no finite stress at some stretch of the data: start with constants whose"
                          f" limit lies beyond them")

@@ -13,14 +13,13 @@ import numpy as np
 from ...errors import InputError, check_name, check_type, finite_array
 from ...materials.homogeneous import MODES, in_plane_stretches
 from ...materials.material import Material
+from ...values.tolerances import ROUND_OFF
 
 _TESTED_DISTANCE = 0.1
 """Distance of strains from the tested ones, over their norm, up to which a deformation counts as tested."""
 _TESTED_STRAIN = 0.02
 """Distance of logarithmic strains from the tested ones up to which every deformation counts as tested."""
 
-_COLLINEAR_AREA = 1e-8
-"""Twice the area of a triangle of strains below which its corners count as points of a line."""
 
 
 @dataclass(frozen=True)
@@ -203,7 +202,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
         found: list[tuple[float, float]] = []
         for x, y in chain:
             while len(found) > 1 and ((found[-1][0] - found[-2][0]) * (y - found[-2][1])
-                                      - (found[-1][1] - found[-2][1]) * (x - found[-2][0])) <= _COLLINEAR_AREA:
+                                      - (found[-1][1] - found[-2][1]) * (x - found[-2][0])) <= ROUND_OFF:
                 found.pop()
             found.append((x, y))
         return found[:-1]

@@ -8,10 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-_ASSUMED_NOISE = 0.01
-"""Relative noise of a measurement that is assumed if the misfit is smaller."""
-_UNDETERMINED_ERROR = 0.5
-"""Standard error over the value of a constant above which the tests do not determine the constant."""
+from ...values.intervals import UNDETERMINED
+from ...values.tolerances import MEASURED_ACCURACY
+
 _MIN_STRESS_CHANGE = 1e-6
 """Change of some stress, over its size in the fit, that the step of a difference quotient must reach."""
 
@@ -63,9 +62,9 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
     unit_errors = np.sqrt(np.diag(inverse))
     squares, freedom = float(np.sum(((first - measured) / sizes) ** 2)), len(measured) - len(values)
     error = math.sqrt(squares / freedom) if freedom > 0 else math.nan
-    noise = max(_ASSUMED_NOISE, math.sqrt(squares / len(measured)))
+    noise = max(MEASURED_ACCURACY, math.sqrt(squares / len(measured)))
     undetermined = tuple(name for name, value, unit_error in zip(constants, values, unit_errors)
-                         if noise * unit_error > _UNDETERMINED_ERROR * abs(value))
+                         if noise * unit_error > UNDETERMINED * abs(value))
     with np.errstate(invalid="ignore"):
         covariance = np.where(inverse == 0, 0.0, error**2 * inverse)
     errors = {name: float(error * unit_error) for name, unit_error in zip(constants, unit_errors)}

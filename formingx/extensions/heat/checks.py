@@ -10,6 +10,7 @@ from ...findings import Finding, register
 from ...materials.constants import OfTemperature
 from ...materials.solidification import Solidification
 from ...values.temperature import FunctionOfTemperature
+from ...values.tolerances import MEASURED_ACCURACY
 from .cooling_history import CoolingHistory
 from .layers import graded, height_at
 from .run import checked_materials
@@ -19,8 +20,6 @@ _FROZEN = (", where the material does not relax any more: give Solidification or
 _MODULUS_RATIO = 2.0
 """Equilibrium modulus at the lowest temperature over the modulus at the highest, above which a check warns."""
 
-_ALLOWED_ERROR = 0.01
-"""Error of the temperature, over the span of temperatures, for which `layers_needed` asks."""
 _ERROR_OF_ONE_LAYER = 0.14
 """Error over the span of temperatures with one layer of elements, for a face that is chilled suddenly.
 
@@ -63,7 +62,7 @@ def layers_needed(biot: float) -> int:
     Returns:
         Number of layers through the thickness.
     """
-    return max(1, int(np.ceil((_ERROR_OF_ONE_LAYER * _biot_factor(biot) / _ALLOWED_ERROR) ** (1 / _LAYER_ORDER))))
+    return max(1, int(np.ceil((_ERROR_OF_ONE_LAYER * _biot_factor(biot) / MEASURED_ACCURACY) ** (1 / _LAYER_ORDER))))
 
 
 def _biot_factor(biot: float) -> float:

@@ -14,6 +14,7 @@ from ...forms.history import Start
 from ...forms.transfer import MovingLeastSquares
 from ...ranks import combined, gathered, listed
 from ...values.temperature import ABSOLUTE_ZERO
+from ...values.tolerances import EXAMINED_STATES, WARNED_ERROR
 from . import stepping
 from .conduction import Conduction
 from .layers import graded
@@ -23,12 +24,6 @@ from .space_error import SpaceError
 _MAX_STEPS = 10_000
 """Largest number of steps of the heat equation in one step of the run."""
 
-_WARNED_ERROR = 2e-3
-"""Discretisation error of the temperature, over its span, above which a run warns: the promised accuracy of stresses.
-"""
-
-_CHECKED_STATES = 8
-"""Number of states in which the discretisation error is estimated, besides the ends of stages."""
 
 _CONTACT_DISTANCE = 1e-2
 """Distance to a tool over the thickness of the body within which a node exchanges heat with it.
@@ -136,7 +131,7 @@ class CoolingHistory:
         if not states:
             return []
         begun = [k + 1 for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage]
-        looked = sorted({*np.linspace(0, len(states) - 1, _CHECKED_STATES).astype(int).tolist(),
+        looked = sorted({*np.linspace(0, len(states) - 1, EXAMINED_STATES).astype(int).tolist(),
                          *(k - 1 for k in begun)})
         looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
         errors = self.errors_in_space([states[k] for k in looked])
@@ -145,7 +140,7 @@ class CoolingHistory:
         ends = listed(comm, [float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
         worst, span = int(np.argmax(errors)), np.ptp(np.concatenate(ends))
         duration = float(np.diff([0.0, *(states[k].time for k in looked)])[worst])    # since it was looked at last
-        allowed = max(self._cooling.tolerance, _WARNED_ERROR * span)
+        allowed = max(self._cooling.tolerance, WARNED_ERROR * span)
         if errors[worst] <= allowed:
             return []
         low, high = self._cooling.extremes(scene)

@@ -30,9 +30,6 @@ from ...solve.stepping import allowed as allowed_error
 from ...units import NONE, Units
 from .part import trimmed_mesh
 
-_COOLING_TIME = 1.0
-"""Default cooling time over thickness^2/diffusivity: a temperature difference decreases by exp(-pi^2)."""
-
 
 @dataclass(frozen=True, repr=False)
 class Springback(KeyNumbers):
@@ -154,7 +151,7 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
         raise InputError("Path.springback: a membrane has no bending stiffness to keep a shape: form a solid,"
                          " MixedPressure()")
     if trim is not None:
-        if source.scene.preformed is not None:
+        if source.scene.state_transfer is not None:
             raise InputError("Path.springback: trim: is not available for a remeshed run: leave it out")
         mesh, trimmed = _trimmed(mesh, path.wall(state), trim)
     heat, cooling_time = _heat(source.scene, mesh, temperature, boundaries, duration, path.wall(state))
@@ -221,7 +218,7 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
         faces, finite("Path.springback: temperature", temperature)))
     if duration is not None:
         return heat, positive("Path.springback: duration", duration)
-    return heat, _COOLING_TIME * heat.time_through(scene.mesh, thickness)
+    return heat, heat.time_through(scene.mesh, thickness)      # differences of temperature decrease by exp(-pi^2)
 
 
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
@@ -241,7 +238,8 @@ def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
     if 0 not in constrained and not scene.kinematics.axisymmetric:
         supports.append(_FixedComponent(0, point))
     return Scene(mesh=mesh, materials=scene.materials, supports=supports, model=scene.model, heat=heat,
-                 kinematics=scene.kinematics, quadrature_degree=scene.quadrature_degree, preformed=scene.preformed,
+                 kinematics=scene.kinematics, quadrature_degree=scene.quadrature_degree,
+                 state_transfer=scene.state_transfer,
                  temperature=None if scene.temperature is None else scene.temperature.T,
                  expansion=dict(scene.expansion) or None)
 

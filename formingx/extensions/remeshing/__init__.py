@@ -6,8 +6,8 @@ from ...problem.problem import Problem
 from ...results.files.checkpoint import register_mesh_loader
 from ...solve.state import State
 from . import files
-from .preformed import Preformed
 from .remeshing import Remesh
+from .state_transfer import StateTransfer
 
 
 def _load(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
@@ -18,7 +18,7 @@ def _load(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
         last: the last state on the previous mesh.
         data: data of the next mesh in the checkpoint, the result of `files.save`.
     """
-    return files.load((problem, last), data, Preformed)
+    return files.load((problem, last), data, StateTransfer)
 
 
 register_mesh_loader(_load)

@@ -43,46 +43,46 @@ class MaterialPointProbe(Probe):
         return super()._read() + self.earlier_displacement
 
 
-def original_positions(preformed: Any, points: np.ndarray) -> np.ndarray:
+def original_positions(state_transfer: Any, points: np.ndarray) -> np.ndarray:
     """Return the positions on the first mesh of points of a new mesh.
 
     They are interpolated from the nodes of the old mesh, in the deformed body.
 
     Args:
-        preformed: the `Preformed` of the new mesh.
+        state_transfer: the `StateTransfer` of the new mesh.
         points: positions on the new mesh, shape (n, 2), length.
 
     Returns:
         Positions on the first mesh, shape (n, 2), length.
     """
-    old, state = preformed.before
+    old, state = state_transfer.before
     nodes = node_positions(old.forms.domain)
-    first = nodes if old.scene.preformed is None else original_positions(old.scene.preformed, nodes)
+    first = nodes if old.scene.state_transfer is None else original_positions(old.scene.state_transfer, nodes)
     found = MovingLeastSquares(old.comm, nodes + Probe(old, nodes).displacement_in(state), points).fitted(first)
     return np.clip(found, first.min(0), first.max(0))
 
 
-def scene_on_new_mesh(mesh: Any, preformed: Any) -> Any:
+def scene_on_new_mesh(mesh: Any, state_transfer: Any) -> Any:
     """Return a scene on a new mesh of the deformed body, with the items of the scene on the old mesh.
 
-    The old scene is the scene of `Preformed.before`. Its materials, loads, supports and contacts are kept. The last
+    The old scene is the scene of `StateTransfer.before`. Its materials, loads, supports and contacts are kept. The last
     temperature on the old mesh becomes the initial one.
 
     Args:
         mesh: the new mesh.
-        preformed: the `Preformed` of the new mesh.
+        state_transfer: the `StateTransfer` of the new mesh.
 
     Returns:
         The scene.
     """
-    old, state = preformed.before
+    old, state = state_transfer.before
     if old.temperature is None:
-        return old.scene.with_mesh(mesh, preformed)
+        return old.scene.with_mesh(mesh, state_transfer)
     with old.state_context(state):
         field = old.temperature.T.copy()
     nodes, T = dof_positions(field.function_space), field.x.array
     moved = nodes + Probe(old, nodes).displacement_in(state)
-    return old.scene.with_mesh(mesh, preformed, lambda R, Z: np.clip(
+    return old.scene.with_mesh(mesh, state_transfer, lambda R, Z: np.clip(
         MovingLeastSquares(old.comm, moved, np.column_stack([R, Z])).fitted(T), T.min(), T.max()))
 
 
@@ -96,9 +96,9 @@ def followed(problem: Any, points: np.ndarray) -> np.ndarray:
     Returns:
         Positions on the mesh of the problem, shape (n, 2), length.
     """
-    if problem.scene.preformed is None:
+    if problem.scene.state_transfer is None:
         return points
-    old, state = problem.scene.preformed.before
+    old, state = problem.scene.state_transfer.before
     points = followed(old, points)
     return _OutlineProjection(problem)(points + Probe(old, points).displacement_in(state))
 

@@ -33,19 +33,19 @@ def save(problem: Any) -> dict[str, Any]:
     points[nodes] = grid.points
     layers = {name: nodes[rows[np.argsort(number[mesh.cells.find(mesh.layers[name])])]]
               for name, rows in grid.layers.items()}
-    preformed = problem.scene.preformed._replace(before=None)
+    state_transfer = problem.scene.state_transfer._replace(before=None)
     return {"points": points, "layers": layers, "boundaries": {name: nodes[r] for name, r in grid.boundaries.items()},
-            "preformed": preformed._asdict(), "shifts": [c.shift for c in problem.contacts],
+            "preformed": state_transfer._asdict(), "shifts": [c.shift for c in problem.contacts],
             "scene": describe(problem)["mesh"]}
 
 
-def load(before: tuple[Problem, State], data: dict[str, Any], preformed: Callable[..., Any]) -> Problem:
+def load(before: tuple[Problem, State], data: dict[str, Any], state_transfer: Callable[..., Any]) -> Problem:
     """Return the problem on a mesh that was made during a run, from its stored data.
 
     Args:
         before: the problem on the mesh before, and the last state on it.
         data: result of `save`.
-        preformed: the class `Preformed`, called with the stored fields.
+        state_transfer: the class `StateTransfer`, called with the stored fields.
 
     Returns:
         The problem.
@@ -60,7 +60,7 @@ def load(before: tuple[Problem, State], data: dict[str, Any], preformed: Callabl
     grid = Grid(points, np.arange(1, len(points) + 1), {k: np.array(v) for k, v in data["layers"].items()},
                 {k: np.array(v) for k, v in data["boundaries"].items()})
     mesh = to_mesh(lambda: grid, scene.mesh.comm, "checkpoint: its mesh")
-    made = Problem(scene_on_new_mesh(mesh, preformed(**data["preformed"])._replace(before=before)))
+    made = Problem(scene_on_new_mesh(mesh, state_transfer(**data["preformed"])._replace(before=before)))
     for contact, shift in zip(made.contacts, data["shifts"], strict=True):
         if shift is not None:
             contact.shift_distances(np.array(shift))

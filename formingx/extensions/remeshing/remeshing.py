@@ -33,11 +33,12 @@ from ...solve.stepping import StepControl
 from .contact_transfer import ContactState, transfer_contact
 from .earlier_meshes import scene_on_new_mesh
 from .outline_mesh import enclosed_volume, mesh_of_outline
-from .preformed import Preformed
+from .state_transfer import StateTransfer
 
 log = logging.getLogger("formingx")
 
-_SIZE_FACTORS = (1.0, 0.9, 1.1, 0.8)
+_SIZE_STEP = 0.1  # relative change of the element size from one try to the next
+_SIZE_FACTORS = [1 + k * _SIZE_STEP for k in (0, -1, 1, -2)]
 """Element sizes to try, relative to the requested size."""
 
 _GOOD_MARGIN = 0.4
@@ -329,12 +330,12 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
     layer, = scene.mesh.layers
     mesh = mesh_of_outline(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
                     lambda x, names: _moved_out_of_tools(x, names, contacts))
-    new_scene = scene_on_new_mesh(mesh, Preformed.of(old, state))
+    new_scene = scene_on_new_mesh(mesh, StateTransfer.of(old, state))
     problem = Problem(new_scene)
     problem.limit.end_at_closures()
     setting, control = old.setting.on_next_mesh(old.scales, problem.scales, state.control)
     curve = Curve(problem, tolerances)
-    x = new_scene.preformed.unknowns(problem)
+    x = new_scene.state_transfer.unknowns(problem)
     problem.enter(setting, x, control)
     if not setting.rate[-1]:
         problem.clock = state.time

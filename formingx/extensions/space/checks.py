@@ -10,10 +10,9 @@ from ...physics.supports import NAMES, Symmetry
 from ...ranks import gathered
 from ...scene.contact_checks import OTHER_UNIT
 from ...tools.pieces import Arc
+from ...values.tolerances import NEGLIGIBLE
 from .solid_tool import Swept
 from .triangulated import Triangulated
-
-_COMPRESSED_AREA = 1e-3              # share of the sheet's area in compression from which on a finding is made
 
 
 @register("end")
@@ -32,7 +31,7 @@ def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
         return
     wall = path.wall()
     share = float(wall.reference_area[wall.wrinkled].sum() / wall.reference_area.sum())
-    if share >= _COMPRESSED_AREA:
+    if share >= NEGLIGIBLE:
         place = ", ".join(f"{v:.4g}" for v in wall.middle[int(np.argmax(wall.wrinkled))])
         yield Finding("serious", "membrane", f"{100 * share:.3g} % of the sheet is in compression in the last state,"
                       f" one place at (x, y, z) = ({place}): it wrinkles there, and its wall depends on the mesh: use"

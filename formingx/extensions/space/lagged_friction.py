@@ -27,7 +27,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...physics.contact_law import ContactHistory, ContactStatus, Motion, Tractions, outer
-from .lagged_stick import SMALL_GAP, LaggedStick
+from ...values.tolerances import NEGLIGIBLE
+from .lagged_stick import LaggedStick
 
 _MAX_PRESSURE_RATIO = 10.0  # factor, up or down, from the last pressure to the pressure that limits friction
 _SLIDES_ON = 1 + 1e-9      # stored slip of sliding points, over g_s: they continue to slide in spite of round-off
@@ -97,7 +98,7 @@ class LaggedFriction(LaggedStick):
         Returns:
             Mask, shape (n,).
         """
-        return self.in_contact(old) & (self.distance(x) < -SMALL_GAP * self.theta)
+        return self.in_contact(old) & (self.distance(x) < -NEGLIGIBLE * self.theta)
 
     def start(self, x: np.ndarray) -> ContactHistory:
         """Return the history variables of points at the start of a run, without slip.

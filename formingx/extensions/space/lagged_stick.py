@@ -15,14 +15,14 @@ touch again in each step, and the run makes no progress.
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
 
 from ...physics.contact_law import ContactHistory, ContactLaw, Motion, Tractions
 from ...tools.tool import RigidTool
-
-_BISECTIONS = 30           # of a chord, to where it crosses a tool: 1e-9 of it
+from ...values.tolerances import NEGLIGIBLE, ROUND_OFF
 
 _TENSILE_DISTANCE = 0.01
 """Distance outside the tool, over the distance from the sticking position, above which a point is in tension.
@@ -30,8 +30,8 @@ _TENSILE_DISTANCE = 0.01
 A point that is sheared along a facet leaves the tool at the edges of the facet, without tension.
 """
 
-SMALL_GAP = 1e-3
-"""Distance outside the tool, over `LaggedStick.theta`, up to which a point is not in tension."""
+_BISECTIONS = math.ceil(-math.log2(ROUND_OFF))
+"""Bisections of a chord down to the point where it crosses a tool."""
 
 
 class LaggedStick(ContactLaw):
@@ -93,7 +93,7 @@ class LaggedStick(ContactLaw):
             Mask, shape (n,).
         """
         travel = np.linalg.norm(x - old.position, axis=1)
-        limit = np.maximum(_TENSILE_DISTANCE * travel, SMALL_GAP * self.theta)
+        limit = np.maximum(_TENSILE_DISTANCE * travel, NEGLIGIBLE * self.theta)
         return self.separates & self.in_contact(old) & (-self.distance(x) > limit)
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:

@@ -14,11 +14,9 @@ from mpi4py import MPI
 from ...errors import InputError, as_list, check_name, check_type, non_negative, pair, positive
 from ...mesh import with_gmsh
 from ...mesh.check import crossing_point
+from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.grid import Grid, counter_clockwise, to_mesh
 from ...mesh.mesh import Mesh
-
-MAX_TRIANGLES = 500_000
-"""Largest number of triangles of a sheet."""
 
 _PARTS = ("whole", "half", "quarter")
 
@@ -197,9 +195,9 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     lines = as_list("sheet: reflected", reflected, "names")
     for k, name in enumerate(lines):
         check_name("sheet: reflected: boundary", name, {edge.name for edge in edges} - set(lines[:k]))
-    if 2 ** len(lines) * np.sum(areas / (0.4 * sizes**2)) > MAX_TRIANGLES:
-        raise InputError(f"sheet: size = {size!r}: would make more than {MAX_TRIANGLES} triangles of the sheet, whose"
-                         f" area is {areas.sum():.4g}")
+    if 2 ** len(lines) * np.sum(areas / (0.4 * sizes**2)) > 2 * MAX_RECTANGLES:
+        raise InputError(f"sheet: size = {size!r}: would make more than {2 * MAX_RECTANGLES} triangles of the sheet,"
+                         f" whose area is {areas.sum():.4g}")
     words = as_list("sheet: layers", layers, "names")
     if not words or len(set(words)) < len(words):
         raise InputError(f"sheet: layers = {layers!r}: must be at least one name, and each another")

@@ -16,8 +16,8 @@ from ...mesh.nodes import COORDINATES
 from ...results import files
 from ...results.show import interactive, page
 from ...results.show.interactive import rounded
-from ...results.show.record import of_path
 from ...results.show.report import PROCESS, scripts
+from ...results.show.report_data import of_path
 from ...results.show.views import look, plotted, shading
 from ...scene.summary import summary
 from ...units import Units
@@ -26,8 +26,8 @@ from .wall import wall_of
 _DRAWN, _FRAMES = 200_000, (10, 100)
 """Largest number of nodes of all drawn states of a report together; smallest and largest number of drawn states."""
 
-_LARGEST_TOOL = 20_000
-"""Largest number of triangles of a tool that a report draws."""
+_LARGEST_TOOL = _DRAWN // _FRAMES[0]
+"""Largest number of triangles of a tool that a report draws, as many as nodes of the body."""
 
 
 def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:

@@ -15,11 +15,11 @@ from ...io.stl import volume, write_stl
 from ...physics.contact import Contact
 from ...physics.contact_law import ContactLaw
 from ...tools.profile import Tool
+from ...values.tolerances import ROUND_OFF
 from .bodies import merged
 from .lagged_friction import Distances, LaggedFriction
 from .lagged_stick import LaggedStick
 
-_AXIS_TOLERANCE = 1e-9            # distance from the axis, over the size of a profile, that counts as 0
 _CORNER_PIECES = 24           # straight pieces of a rounded corner in `surface`
 
 
@@ -151,7 +151,7 @@ class Swept(SolidTool):
         across = np.column_stack([-way[:, 1], way[:, 0], np.zeros(len(x))])         # where the curve of `r` bends
         turn = found.normal[:, 0] * bend
         if self.kind == "revolved":                          # on the axis both curvatures are one
-            turn = np.where(r > _AXIS_TOLERANCE * self._size, turn, found.curvature)
+            turn = np.where(r > ROUND_OFF * self._size, turn, found.curvature)
         return Distances(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
 
     def _distance(self, x):

@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, direction, pair, positive, triple
+from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.edges import edges_of
 from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from ...ranks import gathered
 from ...results.files.column_table import ColumnTable
-from .sheet import MAX_TRIANGLES
 from .surface import wrinkled
 
 
@@ -204,8 +204,8 @@ class SheetWall(ColumnTable):
         """
         size, found = positive("printed: size", size), []
         sides = np.ptp(self.reference_points[:, :COORDINATES], axis=0)
-        if np.prod(sides) > MAX_TRIANGLES * size * size:
-            raise InputError(f"printed: size = {size!r}: would make more than {MAX_TRIANGLES} squares on the sheet,"
+        if np.prod(sides) > MAX_RECTANGLES * size * size:
+            raise InputError(f"printed: size = {size!r}: would make more than {MAX_RECTANGLES} squares on the sheet,"
                              f" whose sides are {sides[0]:.4g} and {sides[1]:.4g}")
         edges = edges_of(self.triangles)[1]
         for axis in (0, 1):

@@ -15,8 +15,6 @@ from ...results.extend import method_of
 from ...results.files.column_table import ColumnTable
 from ...results.path import Path
 
-_POINTS_PER_LAYER = 4               # Gauss points of a layer
-
 
 @dataclass(frozen=True, repr=False)
 class HoopResultants(ColumnTable):
@@ -82,7 +80,7 @@ def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
     profile = path.profile(state)
     (names, between), bottom, top = between_layers(scene.mesh, profile), profile.reference_bottom, profile.reference_top
     lines = np.array([bottom, *between, top])[:, 1::2]              # mid-edge nodes: corners of the rim are singular
-    gauss, weights = np.polynomial.legendre.leggauss(_POINTS_PER_LAYER)
+    gauss, weights = np.polynomial.legendre.leggauss(scene.quadrature_degree // 2 + 2)
     stress, resultant = path.stress(state), np.zeros(lines.shape[1])
     for name, a, b in zip(names, lines[:-1], lines[1:], strict=True):
         points = a[:, None] + (b - a)[:, None] * (1 + gauss)[:, None] / 2

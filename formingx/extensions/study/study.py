@@ -30,12 +30,10 @@ from mpi4py import MPI
 from ...errors import InputError, check_name, count, file_path
 from ...results.files import replace
 from ...results.files.column_table import ColumnTable
+from ...values.tolerances import NEGLIGIBLE
 from . import effects, stored_runs
 from .task import Measure, StudyRun, Task, as_text, check_importable, completed_runs, executor_context
 from .variables import sets_of_values
-
-_EDGE_TOLERANCE = 1e-3
-"""Distance from the ends of the range of a variable, over this range, within which the best value is at its edge."""
 
 
 class Study(ColumnTable):
@@ -221,7 +219,7 @@ class Study(ColumnTable):
         for name in self.variables:
             values = [run.values[name] for run in self.runs]
             low, high, best = min(values), max(values), self.best.values[name]
-            margin = _EDGE_TOLERANCE * (high - low)
+            margin = NEGLIGIBLE * (high - low)
             if low < high and not low + margin < best < high - margin:
                 found.append(f"the best is at the edge of {name}, which was run from {low:g} to {high:g}: a better one"
                              f" may lie {'below' if best <= low + margin else 'above'}")

@@ -14,11 +14,12 @@ from ...forms.outline import Outline, edge_points
 from ...ranks import gathered
 from ...scene.tool_width import CUT
 from ...solve.state import State
+from ...values.tolerances import DIFFERENCE_STEP, FAR, LARGE_ERROR, NEGLIGIBLE, WARNED_ERROR
 
 
 @dataclass(frozen=True)
-class Limits:
-    """Limits beyond which a state is inadmissible, and limits from which a run warns.
+class AdmissibilityLimits:
+    """Limits of volumes, depths and forces beyond which a state is inadmissible, all dimensionless.
 
     Attributes:
         volume: largest root mean square of J - 1 over the body, J = det F. Creases at clamped rims and at corners of
@@ -29,16 +30,8 @@ class Limits:
             whichever is larger.
         penetration: largest penetration of a contact point, over the deformed wall there. Beyond it the body did not
             follow the tool. Williams' plug on coarse elements reaches 0.051.
-        warning_error: relative error of a tool force due to penetration above which a run warns.
-        largest_error: largest relative error of a tool force due to penetration.
         largest_energy_ratio: upper bound of the estimated relative error of a tool force, over the fraction of the
             strain energy that penetration stores. It matters for a body that is pressed flat.
-        difference_step: half the step, in arc length of the path, of a central difference quotient; dimensionless.
-        negligible_penetration: penetration over the sheet thickness up to which `largest_error` does not apply, as at
-            a first touch.
-        pole_stretch: largest value of the column "pole_stretch". It is 1e150 if the two faces cross at the pole.
-        tensile_force: largest force with which the body pulls a frictionless tool, over the sum of the normal forces on
-            it.
     """
 
     volume: float = 0.25
@@ -46,16 +39,10 @@ class Limits:
     allowed_elements: int = 4
     depth: float = 0.25
     penetration: float = 0.15
-    warning_error: float = 2e-3
-    largest_error: float = 0.05
     largest_energy_ratio: float = 3.0
-    difference_step: float = 1e-5
-    negligible_penetration: float = 1e-3
-    pole_stretch: float = 1e100
-    tensile_force: float = 1e-3
 
 
-_LIMITS = Limits()
+_LIMITS = AdmissibilityLimits()
 
 
 class Depth(NamedTuple):
@@ -125,7 +112,7 @@ class AdmissibilityCheck:
             lengths = _lengths(edges)
             for contact in self._problem.present:
                 error = _force_error(contact, state, self._images)
-                if error > _LIMITS.warning_error:
+                if error > WARNED_ERROR:
                     name = contact.contact.label
                     found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
                                          f" about {100 * error:.2g} %: {_penalty_advice(contact, error)}."))
@@ -141,7 +128,7 @@ class AdmissibilityCheck:
         for name, value in measures.items():
             if not np.isfinite(value):
                 yield f"the {name.replace('_', ' ')} is {value}"
-        if measures.get("pole_stretch", 1.0) > _LIMITS.pole_stretch:
+        if measures.get("pole_stretch", 1.0) > FAR:        # 1e150 stands for a stretch of 0
             yield "the two faces cross at the pole"
         if not self._solid:
             for deep in self._deepest_points(state, _allowed_penetration):
@@ -168,8 +155,8 @@ class AdmissibilityCheck:
                        f" penalty of {50 * deep.ratio * deep.contact.contact.penalty:.1g}")
             for contact in problem.present:
                 error = _force_error(contact, state, self._images)
-                if error > _LIMITS.largest_error and resultants.penetration(
-                        contact, state.x, state.control) > _LIMITS.negligible_penetration * contact.thickness:
+                if error > LARGE_ERROR and resultants.penetration(
+                        contact, state.x, state.control) > NEGLIGIBLE * contact.thickness:
                     yield (f"the body did not follow the tool of {contact.contact.label!r}: penetration changes"
                            f" the force by about {100 * error:.2g} %: {_penalty_advice(contact, error)}")
                 if _pulled(contact, state):
@@ -190,7 +177,7 @@ class AdmissibilityCheck:
             lengths: their lengths, shape (m,).
             state: the state.
             own: True to examine the face of the contact alone, with the limit of a warning; False: the whole boundary,
-                with `Limits.depth`.
+                with `AdmissibilityLimits.depth`.
         """
         a, b, middle = edges.transpose(1, 0, 2)
         slopes = np.linalg.norm([4 * middle - 3 * a - b, a - 4 * middle + 3 * b], axis=-1)
@@ -275,7 +262,7 @@ def _force_error(contact: Any, state: State, images: int) -> float:
     r"""Return the estimated relative error of the force F on a moving tool due to penetration; collective.
 
     Penetration stores the energy E of the total strain energy W, so the tool is 2 E/F too far in the body. With its
-    travel t and the limit c = `Limits.largest_energy_ratio`, the estimate is
+    travel t and the limit c = `AdmissibilityLimits.largest_energy_ratio`, the estimate is
 
     .. math::
         \min\left(\frac{2 E}{F^2} \left|\frac{dF}{dt}\right|, \; c \, \frac{E}{W}\right)
@@ -291,11 +278,11 @@ def _force_error(contact: Any, state: State, images: int) -> float:
         return 0.0
     energy = resultants.energy(contact, state.x, state.control)
     share = images * energy / (state.measures.get("strain_energy") or np.inf)
-    if share < 0.1 * _LIMITS.warning_error:
+    if share < 0.1 * WARNED_ERROR:
         return share
     direction = contact.contact.travel_vector / np.hypot(*contact.contact.travel_vector)
-    h = _LIMITS.difference_step
-    states = [(state.x + s * state.direction, state.control + s * state.slope) for s in (-h, 0.0, h)]
+    states = [(state.x + s * state.direction, state.control + s * state.slope)
+              for s in (-DIFFERENCE_STEP, 0.0, DIFFERENCE_STEP)]
     backward, force, forward = (resultants.force(contact, *point) @ direction for point in states)
     travel = (contact.tool_displacement(states[2][1]) - contact.tool_displacement(states[0][1])) @ direction
     if not force or not travel:
@@ -310,7 +297,7 @@ def _penalty_advice(contact: Any, error: float) -> str:
         contact: the `FaceContact`.
         error: relative error of the tool force due to penetration (`_force_error`).
     """
-    return f"give Contact a penalty of {contact.contact.penalty * error / _LIMITS.warning_error * 10:.1g}"
+    return f"give Contact a penalty of {contact.contact.penalty * error / WARNED_ERROR * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:
@@ -324,7 +311,7 @@ def _pulled(contact: Any, state: State) -> bool:
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False
     force = resultants.force(contact, state.x, state.control) @ law.travel_vector / np.hypot(*law.travel_vector)
-    return bool(force > _LIMITS.tensile_force * resultants.normal_force(contact, state.x, state.control))
+    return bool(force > NEGLIGIBLE * resultants.normal_force(contact, state.x, state.control))
 
 
 def _lengths(edges: np.ndarray) -> np.ndarray:

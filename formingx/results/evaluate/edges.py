@@ -9,7 +9,7 @@ import numpy as np
 from ...findings import Finding
 from ...ranks import gathered
 
-_WARNED_ANGLE = 40.0
+EDGE_ANGLE = 40.0
 """Angle between tool normals at neighbouring contact points above which a run warns, degrees (tests/test_edges.py)."""
 
 
@@ -76,7 +76,7 @@ def findings(edge: Edge | None) -> list[Finding]:
     Returns:
         A list with the warning; empty if the tool normal turns by less than 40 degrees, or without an edge.
     """
-    if edge is None or edge.turn < _WARNED_ANGLE:
+    if edge is None or edge.turn < EDGE_ANGLE:
         return []
     return [Finding("warning", edge.tool, f"The body slides over an edge of {edge.tool!r} near (r, z) ="
                     f" ({edge.point[0]:.5g}, {edge.point[1]:.5g}), and from one contact point to the next the tool"

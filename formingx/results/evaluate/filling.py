@@ -10,10 +10,9 @@ import numpy as np
 from ...errors import InputError, non_negative
 from ...forms.probes import probe
 from ...tools.shapes import Arc, Tool
+from ...values.tolerances import ROUND_OFF
 from ..files.column_table import ColumnTable
 from .profile import distance_to_line, refined
-
-_SMOOTH_ANGLE = 1e-6  # radians: a joint that turns less is no corner
 
 
 class Corner(NamedTuple):
@@ -124,14 +123,14 @@ def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
     found = []
     pieces = list(tool.pieces)
     for i, piece in enumerate(pieces):
-        if isinstance(piece, Arc) and -np.pi < piece.sweep < -_SMOOTH_ANGLE:
+        if isinstance(piece, Arc) and -np.pi < piece.sweep < -ROUND_OFF:
             angles = piece.start + piece.sweep * np.linspace(0, 1, 17)
             points = piece.centre + piece.radius * np.column_stack([np.cos(angles), np.sin(angles)])
             found.append((Corner((float(points[8, 0]), float(points[8, 1])), piece.radius), points))
         following = pieces[i + 1] if i + 1 < len(pieces) else pieces[0] if tool.closed else None
         if following is not None:
             turn = np.pi - (np.pi - (following.angles[0] - piece.angles[1])) % (2 * np.pi)
-            if turn < -_SMOOTH_ANGLE:
+            if turn < -ROUND_OFF:
                 end = piece.ends[1]
                 found.append((Corner((float(end[0]), float(end[1])), 0.0), end[None]))
     return found

@@ -11,9 +11,7 @@ import numpy as np
 
 from ...findings import Finding
 from ...ranks import gathered
-
-_WALL_CHANGE = 3e-3
-"""Relative change of the wall, due to the step lengths, above which there is a finding."""
+from ...values.tolerances import WALL_ERROR
 
 _LARGE_SHIFT = 0.1
 """Shift from which the finding estimates no error: the neighbouring points moved too, so the strain changed less."""
@@ -87,7 +85,7 @@ def findings(item: Resticking | None) -> list[Finding]:
     Args:
         item: the contact point with the largest shift (`furthest`), or None.
     """
-    if item is None or item.shift < _WALL_CHANGE:
+    if item is None or item.shift < WALL_ERROR:
         return []
     depend = f"depend on the steps, by up to {100 * item.shift:.2g} %" if item.shift < _LARGE_SHIFT else (
         f"may depend on the steps (that point moved by {100 * item.shift:.2g} % of its tributary length)")

@@ -8,9 +8,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...findings import Finding
-
-_WALL_CHANGE = 0.05
-"""Relative change of the wall in one jump above which later walls are uncertain."""
+from ...values.tolerances import LARGE_ERROR
 
 
 class Snap(NamedTuple):
@@ -72,7 +70,7 @@ def findings(snap: Snap | None) -> list[Finding]:
     Args:
         snap: the snap-through in which the wall changed most (`largest`), or None.
     """
-    if snap is None or snap.change < _WALL_CHANGE:
+    if snap is None or snap.change < LARGE_ERROR:
         return []
     times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"
     return [Finding("warning", "snap-through", f"The body snapped {times} in state {snap.state}: there the wall"

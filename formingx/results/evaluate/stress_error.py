@@ -8,9 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InputError
-
-RESOLVED = 0.05
-"""Relative amount by which sigma_1 and its estimated error may exceed the stress peak of a converged result."""
+from ...values.tolerances import LARGE_ERROR
 
 
 class StressError(NamedTuple):
@@ -92,7 +90,7 @@ class StressPeak(NamedTuple):
     @property
     def converged(self) -> bool:
         """True if principal stress plus error exceeds the largest principal stress by at most 5 % in every cell."""
-        return self.doubtful + self.doubtful_error - self.value <= RESOLVED * abs(self.value)
+        return self.doubtful + self.doubtful_error - self.value <= LARGE_ERROR * abs(self.value)
 
     def __str__(self) -> str:
         largest = f"the largest sigma_1 is {self.value:.4g} at {_show(self.point)}, estimated error {self.error:.2g}"

@@ -16,9 +16,7 @@ from ...findings import Finding
 from ...mesh.nodes import own_cells
 from ...physics.models import Membrane
 from ...ranks import gathered
-
-_MAX_COMPRESSION = 1e-3
-"""Compressive resultant, over shear modulus times thickness, above which the state of a membrane is invalid."""
+from ...values.tolerances import NEGLIGIBLE
 
 
 class Resultant(NamedTuple):
@@ -37,7 +35,7 @@ class Resultant(NamedTuple):
     @property
     def compressed(self) -> bool:
         """True if the resultant is compressive by more than 0.001 times shear modulus times thickness."""
-        return self.value < -_MAX_COMPRESSION
+        return self.value < -NEGLIGIBLE
 
 
 class Tension:

@@ -8,9 +8,7 @@ import numpy as np
 
 from ...findings import Finding
 from ...physics.supports import Clamped
-
-BOUND = 5e-3
-"""Root mean square of J - 1 above which a report warns; a run warns above four times this value."""
+from ...values.tolerances import NOTICEABLE
 
 _CORNER_DISTANCE = 2.0
 """Distance from a clamped face, over the length of the face, within which its singular corners affect J."""
@@ -31,14 +29,14 @@ def findings(error: float, where: str, far_error: float | None = None) -> list[F
         far_error: root mean square of J - 1 away from clamped faces (`away_from_clamps`); None if it is unknown or
             nothing is clamped.
     """
-    if error <= BOUND:
+    if error <= NOTICEABLE:
         return []
-    if far_error is not None and far_error <= 4 * BOUND:
+    if far_error is not None and far_error <= 4 * NOTICEABLE:
         return [Finding("note", "volume", f"The elements at the corner of a clamped face do not keep their volumes: the"
                         f" root mean square of J - 1 is {100 * error:.2g} % ({where}), and {100 * far_error:.2g} % from"
                         f" {_CORNER_DISTANCE:g} lengths of that face on. The corner is singular: take no stresses from"
                         " there.")]
-    return [Finding("warning" if error > 4 * BOUND else "note", "volume",
+    return [Finding("warning" if error > 4 * NOTICEABLE else "note", "volume",
                     f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
                     f" {100 * error:.2g} % ({where}): use a finer mesh.")]
 

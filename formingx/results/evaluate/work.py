@@ -25,16 +25,15 @@ from ...contact.tooling import Tooling
 from ...errors import InputError
 from ...findings import Finding, log_findings
 from ...solve.newton import Failure
+from ...values.tolerances import DIFFERENCE_STEP, NOTICEABLE
 from .step_polynomials import GAUSS, Polynomial, integral, interpolate
 
 _LOSSES = "friction", "jumps", "bonds"
 _MATERIAL_LOSSES = "dissipated_energy", "damage_energy"
 _RAMP_EDGE = 0.06          # distance from the outer edge of the contact ramp, over its half width, that counts as 0
-_DIFFERENCE_STEP = 1e-5              # half the step of a central difference quotient in arc length
 _STEP_IMBALANCE = 2e-4     # allowed imbalance of a step over the largest strain energy of the run
-_RUN_IMBALANCE = 5e-3      # allowed imbalance of a run over the largest entry of the balance
 _MAX_HALVINGS = 6              # largest number of halvings of a step
-_SPLIT_POSITIONS = 0.5, 0.35, 0.65  # positions in a step at which it is split
+_SPLIT_OFFSET = 0.15       # distance from the middle of a step at which it is split if no state is found there
 
 
 class _Reaction(NamedTuple):
@@ -121,7 +120,8 @@ class EnergyBalance:
         if not h:
             return None
         line = [replace(s, direction=(b.x - a.x) / h, slope=(b.control - a.control) / h) for s in (a, b)]
-        for part, (start, end) in itertools.product(_SPLIT_POSITIONS, [line] if self._flows(a, b) else [(a, b), line]):
+        parts = 0.5, 0.5 - _SPLIT_OFFSET, 0.5 + _SPLIT_OFFSET
+        for part, (start, end) in itertools.product(parts, [line] if self._flows(a, b) else [(a, b), line]):
             with problem.state_context(a):
                 if self._flows(a, b):
                     problem.clock = a.time + part * (b.time - a.time)
@@ -218,7 +218,7 @@ class EnergyBalance:
         scale = forms.stress * forms.volume / forms.length
         with problem.state_context(state) as p:
             fields, n = p.x.array_r.copy(), p.n_owned
-            e, d = _DIFFERENCE_STEP, state.direction
+            e, d = DIFFERENCE_STEP, state.direction
             forward, backward = (p.body_forces(fields + sign * e * d, state.control + sign * e * state.slope)
                              for sign in (1, -1))
             change = scale * (forward - backward)[:n] / (2 * e)
@@ -407,10 +407,10 @@ def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
     size = max(float(np.abs(values).max()) for values in balanced.values())
     unbalanced = np.abs(balanced["unbalanced"])
     k = int(np.argmax(unbalanced))
-    if unbalanced[k] <= _RUN_IMBALANCE * size:
+    if unbalanced[k] <= NOTICEABLE * size:
         return []
     return [Finding("warning", "energy", f"The energy balance is off by {100 * unbalanced[k] / size:.2g} % of the"
-                    f" largest entry, up to state {k} ({100 * _RUN_IMBALANCE:g} % is usual): the states are too few for"
+                    f" largest entry, up to state {k} ({100 * NOTICEABLE:g} % is usual): the states are too few for"
                     f" the work between them, contact is too soft, or the run is not accurate. Use shorter steps,"
                     f" StepControl(largest=...), and see path.work().")]
 

@@ -157,7 +157,7 @@ class Checkpoint:
         space = problem.forms.space
         data = _plain_state(state) | {"number": number, "memory": variables, "profile": _profile(self._path, state)}
         if state is segment.states[0] and segment is not self._path.segments[0]:
-            data["mesh"] = problem.scene.preformed.save(problem)
+            data["mesh"] = problem.scene.state_transfer.save(problem)
         for name in FIELDS:
             data |= {name: _by_cell(space, getattr(state, name)), f"{name}_tail": _tail(space, getattr(state, name))}
 

@@ -9,7 +9,7 @@ from ...errors import InputError
 from ...units import NONE, Units
 from . import tabular
 
-_PRINTED_ROWS = 10        # number of printed rows, half of them at the beginning and half at the end
+PRINTED_ROWS = 10        # number of printed rows, half of them at the beginning and half at the end
 _LONGEST = 32_767  # largest number of characters in a cell of Excel
 
 
@@ -72,8 +72,8 @@ class ColumnTable:
 
     def __str__(self) -> str:
         rows = [list(row) for row in zip(*map(_words, self.columns.values()), strict=True)]
-        n, half = len(rows), _PRINTED_ROWS // 2
-        if n > _PRINTED_ROWS + 1:
+        n, half = len(rows), PRINTED_ROWS // 2
+        if n > PRINTED_ROWS + 1:
             rows[half:n - half] = [["..."] * len(self.columns)]
         lines = [list(self.columns), *rows]
         widths = [max(map(len, column)) for column in zip(*lines)]

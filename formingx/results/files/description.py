@@ -26,7 +26,7 @@ def describe(problem: Any) -> dict[str, Any]:
         problem: the `Problem`.
     """
     scene = problem.scene
-    known = set(_PARTS) | {"mesh", "temperature", "preformed"}
+    known = set(_PARTS) | {"mesh", "temperature", "state_transfer"}
     extra = sorted(name for name in vars(scene) if name not in known and not name.startswith("_"))
     found = {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
              **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}

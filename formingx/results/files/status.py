@@ -9,16 +9,13 @@ import numpy as np
 
 from ...errors import non_negative, positive
 from ...findings import Finding, without_notes
+from ...values.tolerances import NEGLIGIBLE, ROUND_OFF
 from . import checkpoint_data
 
 _RECENT_STEPS = 20
 """Number of last steps from which the remaining time is estimated."""
 _MOVES = ("enclosed_volume", "pole_height", "contact_length", "contact_area", "strain_energy")
 """Columns that show that the body moves."""
-_NEGLIGIBLE_CHANGE = 1e-3
-"""Relative change of the columns `_MOVES` over the last steps below which the body counts as not moving."""
-_TARGET_TOLERANCE = 1e-9
-"""Relative distance from a target at which it counts as met."""
 
 
 @dataclass(frozen=True)
@@ -119,8 +116,8 @@ def of_folder(folder: Any) -> Status:
     won = 1 - abs(goal - now) / abs(goal - before) if goal != before else 0.0
     took = counts["seconds"] - done[0]["stepping"]["counts"]["seconds"]
     nearer = won > 0 and abs(goal - now) < abs(goal - done[-2]["measures"][name])
-    remaining = 0.0 if abs(now - goal) <= _TARGET_TOLERANCE * abs(goal) else took * (1 - won) / won if nearer else None
-    moving = leader if leader and not np.isclose(*moved[leader], rtol=_NEGLIGIBLE_CHANGE, atol=0.0) else None
+    remaining = 0.0 if abs(now - goal) <= ROUND_OFF * abs(goal) else took * (1 - won) / won if nearer else None
+    moving = leader if leader and not np.isclose(*moved[leader], rtol=NEGLIGIBLE, atol=0.0) else None
     return Status(n, last["stage"], last["inadmissible_reason"], (name, goal, now), counts["seconds"], remaining,
                   counts.get("limits", {}), age, ended, len(done) == 1, (moving, *moved[moving]) if moving else None)
 

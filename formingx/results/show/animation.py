@@ -15,7 +15,7 @@ from ...errors import InputError, count, positive
 from ...units import NONE, Units
 from .. import files
 from . import plots
-from .record import progress
+from .report_data import progress
 
 
 def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NONE) -> None:

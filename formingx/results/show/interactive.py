@@ -12,12 +12,10 @@ import numpy as np
 
 from ...errors import InputError
 from ...units import Units
-from .record import Record, words
+from .report_data import FRAMES, ReportData, words
 
 DIGITS = 5
 """Significant digits of drawn numbers."""
-STATIONS = 101
-"""Largest number of drawn points along a sheet."""
 
 
 @functools.cache
@@ -45,7 +43,7 @@ def packed(text: str) -> str:
     return base64.b64encode(gzip.compress(text.encode(), 4, mtime=0)).decode()
 
 
-def data(records: list[Record], names: list[str], units: Units, extra: dict[str, Any] | None = None) -> str:
+def data(records: list[ReportData], names: list[str], units: Units, extra: dict[str, Any] | None = None) -> str:
     """Return all data that the script `report.js` of a page draws, as JSON text.
 
     Args:
@@ -62,7 +60,7 @@ def data(records: list[Record], names: list[str], units: Units, extra: dict[str,
                       separators=(",", ":"))
 
 
-def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
+def _run(record: ReportData, name: str, units: Units) -> dict[str, Any]:
     """Return the data of one run for `report.js`: its stages; columns, tools and the sheet in each drawn state."""
     progress, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(progress[a]), "to": float(progress[b - 1])}
@@ -78,10 +76,10 @@ def _run(record: Record, name: str, units: Units) -> dict[str, Any]:
     return found
 
 
-def _sheet(record: Record, units: Units) -> dict[str, Any]:
+def _sheet(record: ReportData, units: Units) -> dict[str, Any]:
     """Return the outline of a sheet and the fields on it in each drawn state, at no more than 101 points along it."""
     n = len(record.profiles[-1].bottom)
-    stations = np.unique(np.linspace(0, n - 1, min(n, STATIONS)).round().astype(int))
+    stations = np.unique(np.linspace(0, n - 1, min(n, FRAMES + 1)).round().astype(int))
     fields: dict[str, list] = {}
     frames = record.frames
     profiles = [record.profiles[k] for k in frames]
@@ -98,7 +96,7 @@ def _sheet(record: Record, units: Units) -> dict[str, Any]:
             "top": [rounded(p.top[stations].T) for p in profiles]}
 
 
-def _label(record: Record, units: Units, key: str) -> str:
+def _label(record: ReportData, units: Units, key: str) -> str:
     """Return the label of a field with its unit.
 
     Args:
@@ -109,7 +107,7 @@ def _label(record: Record, units: Units, key: str) -> str:
     return f"{key}, {record.unit}" if key == "temperature" and record.unit else units.label(key.replace(" ", "_"), key)
 
 
-def _tools(record: Record) -> list[dict[str, Any]]:
+def _tools(record: ReportData) -> list[dict[str, Any]]:
     """Return for each tool of a section its outline, an outline inside the tool, its direction, and its travels.
 
     The travels belong to the drawn states; None while the tool is inactive.
@@ -129,7 +127,7 @@ def _tools(record: Record) -> list[dict[str, Any]]:
     return found
 
 
-def _loading(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any]]:
+def _loading(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any]]:
     """Return charts of the loading curves of each stage: force of a tool over travel, or pressure over pole height."""
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
@@ -143,7 +141,7 @@ def _loading(records: list[Record], names: list[str], units: Units) -> list[dict
     return [chart for chart in drawn if chart]
 
 
-def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
+def _driven(record: ReportData, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
     """Return a loading curve for each travel and each pressure that changes in a stage.
 
     Args:
@@ -172,7 +170,7 @@ def _driven(record: Record, stage: slice) -> list[tuple[str, str, np.ndarray, np
     return found
 
 
-def _in_time(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
+def _in_time(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
     """Return charts of pressures, travels, tool forces and temperatures of the body over the process time."""
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
@@ -208,7 +206,7 @@ def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
             "mode": "lines+markers" if len(x) <= 60 else "lines"}
 
 
-def _filling(records: list[Record], names: list[str], units: Units) -> dict[str, Any] | None:
+def _filling(records: list[ReportData], names: list[str], units: Units) -> dict[str, Any] | None:
     """Return a chart of the remaining gap in each corner of the fixed tools, or None without corners.
 
     The gaps are drawn over the process time if all runs have one, or else over the pressure in the last stage.
@@ -226,7 +224,7 @@ def _filling(records: list[Record], names: list[str], units: Units) -> dict[str,
                   units.label("process_time" if timed else "pressure"), units.label("gap"), traces)
 
 
-def _walls(records: list[Record], names: list[str], units: Units) -> list[dict[str, Any] | None]:
+def _walls(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
     """Return two charts of the wall thickness in the last state: over the height, and over the arc length.
 
     Both show the whole wall and, if there are several, each layer. A chart is None if no run has a profile.

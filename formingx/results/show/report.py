@@ -25,7 +25,7 @@ from .. import files
 from ..evaluate.part import Part, part
 from ..evaluate.wall import Wall
 from . import interactive, page
-from .record import CONTROLS, Record, of_checkpoint, of_path, words
+from .report_data import CONTROLS, ReportData, of_checkpoint, of_path, words
 
 
 def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, names: Sequence[str] | None = None,
@@ -63,12 +63,12 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
     return write(records, file, title or "Runs side by side", None, comm, units, density, trim, names)
 
 
-def write(records: Record | list[Record], file: Any, title: str, failure: Any, comm: Any, units: Units = NONE,
+def write(records: ReportData | list[ReportData], file: Any, title: str, failure: Any, comm: Any, units: Units = NONE,
           density: float | None = None, trim: Any = None, names: list[str] | None = None) -> FilePath:
     """Write the report of one or several records (`report`, `Path.report`).
 
     Args:
-        records: a `Record`, or a list of them.
+        records: a `ReportData`, or a list of them.
         file: its name ends in .html.
         title: heading of the page; "": a default.
         failure: the `ConvergenceError` that ended the run, if one did.
@@ -86,7 +86,7 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
             for a body that is not a sheet.
         OSError: the file cannot be written.
     """
-    records = [records] if isinstance(records, Record) else records
+    records = [records] if isinstance(records, ReportData) else records
     names, file = names or [title or "run"], files.named("report", file, ".html", ".htm")
 
     units = units.per_depth() if all(record.per_depth for record in records) else units
@@ -99,7 +99,7 @@ def write(records: Record | list[Record], file: Any, title: str, failure: Any, c
     return FilePath(file)
 
 
-def _part(record: Record, units: Units, density: float | None, trim: Any) -> Part | None:
+def _part(record: ReportData, units: Units, density: float | None, trim: Any) -> Part | None:
     """Return the key numbers of the part in the last state of a run, or None if the body is not a sheet in a section.
 
     Args:
@@ -120,7 +120,7 @@ def _part(record: Record, units: Units, density: float | None, trim: Any) -> Par
                 record.planes)
 
 
-def _page(records: list[Record], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
+def _page(records: list[ReportData], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
     """Return the report as an HTML page.
 
     Args:
@@ -187,7 +187,7 @@ def _trouble(failure: Any, lead: str) -> list[str]:
     return found + ([page.picture(shape, "The last good state, its elements coloured by J.", "small")] if shape else [])
 
 
-def _details(record: Record, units: Units) -> list[str]:
+def _details(record: ReportData, units: Units) -> list[str]:
     """Return the page's sections below the curves: stages, tools, inputs, output quantities, convergence and states."""
     found = []
     if any(record.stages):
@@ -205,7 +205,7 @@ def _details(record: Record, units: Units) -> list[str]:
     return found
 
 
-def _warnings(record: Record, lead: str = "") -> str:
+def _warnings(record: ReportData, lead: str = "") -> str:
     """Return the findings on a run as HTML elements, or a sentence that there are none.
 
     The page shows two lines of each finding, and after a click its whole text.
@@ -230,7 +230,7 @@ def _finding(found: Finding) -> str:
             f" {html.escape(found.text)}</summary></details>")
 
 
-def _versions(records: list[Record]) -> list[list[str]]:
+def _versions(records: list[ReportData]) -> list[list[str]]:
     """Return rows (name, value) of a table: date of the report, scripts, and versions of programs."""
     try:
         version = importlib.metadata.version("formingx")
@@ -242,7 +242,7 @@ def _versions(records: list[Record]) -> list[list[str]]:
             *([k, v] for k, v in records[0].versions.items())]
 
 
-def _cards(record: Record, found: Part | None, units: Units) -> str:
+def _cards(record: ReportData, found: Part | None, units: Units) -> str:
     """Return the main numbers of the part and of the run as HTML, in large digits.
 
     Args:
@@ -262,7 +262,7 @@ def _cards(record: Record, found: Part | None, units: Units) -> str:
                                          f"</span></div>" for value, what in cards) + "</div>"
 
 
-def _peaks(record: Record, units: Units) -> list[tuple[str, str]]:
+def _peaks(record: ReportData, units: Units) -> list[tuple[str, str]]:
     """Return rows (name, value) of the value of largest magnitude of the force on each tool, and of each pressure."""
     found = [(f"largest force on {name}", force, units.force) for name, force in record.forces.items()]
     found += [(f"largest {words(c)}", v, units.unit_of(c)) for c, v in record.measures.items()
@@ -270,7 +270,7 @@ def _peaks(record: Record, units: Units) -> list[tuple[str, str]]:
     return [(name, f"{v[np.argmax(np.abs(v))]:.4g} {unit}".rstrip()) for name, v, unit in found]
 
 
-def _answers(records: list[Record], names: list[str], parts: list, units: Units) -> str:
+def _answers(records: list[ReportData], names: list[str], parts: list, units: Units) -> str:
     """Return an HTML table of the key numbers of parts, forces and pressures, with one column per run."""
     columns = [dict((found.rows if found is not None else []) + _peaks(record, units))
                for record, found in zip(records, parts)]
@@ -279,7 +279,7 @@ def _answers(records: list[Record], names: list[str], parts: list, units: Units)
     return page.table(["", *names] if len(records) > 1 else ["", ""], rows)
 
 
-def _lead(record: Record, units: Units) -> str:
+def _lead(record: ReportData, units: Units) -> str:
     """Return sentences on the numbers of states and iterations of a run, on the kinematics and on the units."""
     counts = record.counts
     size = f"{len(record.kinds) - 1} states after the start"
@@ -296,7 +296,7 @@ def _lead(record: Record, units: Units) -> str:
     return html.escape(f"{size}. {kind}. {names}{basis}")
 
 
-def _key_numbers(record: Record, units: Units) -> str:
+def _key_numbers(record: ReportData, units: Units) -> str:
     """Return an HTML table of all columns and the extreme walls, at limit points and in the last state."""
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
@@ -309,7 +309,7 @@ def _key_numbers(record: Record, units: Units) -> str:
     return page.table(head, rows)
 
 
-def _stages(record: Record, units: Units) -> str:
+def _stages(record: ReportData, units: Units) -> str:
     """Return an HTML table with a row per stage: states, iterations, controls at its end, tool forces, gap, wall."""
     columns = [c for end in CONTROLS for c in record.measures if c.endswith(end)]
     columns += ["process_time"] * record.timed
@@ -328,7 +328,7 @@ def _stages(record: Record, units: Units) -> str:
                        units.label("gap", "largest gap in a corner"), "smallest wall / original thickness"], rows)
 
 
-def _tools(record: Record, units: Units) -> str:
+def _tools(record: ReportData, units: Units) -> str:
     """Return an HTML table of the contacts, with the travel of each tool and the force on it in the last state."""
     rows = []
     for contact, name, travel in zip(record.tooling.contacts, record.tooling.names, record.travels[-1]):
@@ -365,14 +365,14 @@ def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
         return file.read_bytes()
 
 
-def _convergence(record: Record) -> str:
+def _convergence(record: ReportData) -> str:
     """Return a figure of the relative corrections of Newton's method, one line per state; "" without iterations."""
     lines = [[row[1] for row in history if row[1] > 0] for history in record.histories]
     return page.logarithmic(lines, "Newton iteration", "correction |\u0394x|/|x|",
                             "Correction of every Newton iteration, one line per state.") if any(lines) else ""
 
 
-def _iterations(record: Record, units: Units) -> str:
+def _iterations(record: ReportData, units: Units) -> str:
     """Return an HTML table of the Newton iterations of each drawn state: control, corrections and last residual."""
     controls = {k: record.control(k) for k in record.frames}
     rows, columns = [], list(dict.fromkeys(controls.values()))
@@ -385,7 +385,7 @@ def _iterations(record: Record, units: Units) -> str:
     return page.table(head, rows)
 
 
-def _states(record: Record, units: Units) -> str:
+def _states(record: ReportData, units: Units) -> str:
     """Return an HTML table of all output quantities (columns) in the drawn states."""
     rows = [[str(k), record.kinds[k], *(page.number(v[k]) for v in record.measures.values())] for k in record.frames]
     return page.table(["state", "kind", *map(units.label, record.measures)], rows)

@@ -44,7 +44,7 @@ _MIN_DETERMINANT_RATIO = 0.3
 """Smallest det b and hoop entry of b in an element, over those of the mean; a field below is moved towards the mean."""
 
 
-class Preformed(NamedTuple):
+class StateTransfer(NamedTuple):
     """Deformed state of a body on its old mesh with m cells, to be transferred to a new mesh; on one rank.
 
     Attributes:
@@ -67,7 +67,7 @@ class Preformed(NamedTuple):
     before: Any = None
 
     @classmethod
-    def of(cls, problem: Any, state: Any) -> Preformed:
+    def of(cls, problem: Any, state: Any) -> StateTransfer:
         """Return the positions, deformations and pressures of the body in a state, for a new mesh of it.
 
         Args:
@@ -85,8 +85,8 @@ class Preformed(NamedTuple):
                          np.zeros((len(both), 3, 0)))
         x, reference = np.split(both, 2, axis=2)
         b = np.tile([1.0, 0.0, 1.0, 1.0, 1.0, 0.0], (len(x), 6, 1))
-        if forms.scene.preformed is not None:
-            b = forms.scene.preformed._projected_fields(forms)[0]
+        if forms.scene.state_transfer is not None:
+            b = forms.scene.state_transfer._projected_fields(forms)[0]
         scene = forms.scene
         stiffness = scene.model.volume_stiffness * max(map(scene.shear_modulus, scene.mesh.layers)) / forms.stress
         return cls(x, reference, b, pressures, stiffness, (problem, state))

@@ -12,6 +12,7 @@ from ...errors import InputError
 from ...findings import Finding, worst_first
 from ...mesh.nodes import nearest
 from ...scene.symmetry import NO_PLANES, MirrorPlanes
+from ...values.tolerances import LARGE_ERROR, NEGLIGIBLE, NOTICEABLE
 from .. import files
 from ..evaluate import volume
 from ..evaluate.contact_face import ContactFace, ContactTable, tool_forces
@@ -21,12 +22,6 @@ from ..files.description import plain
 from ..files.progress import progress as shown_progress
 from ..files.status import target_column
 
-PENETRATION = 0.05
-"""Penetration over the smallest thickness of the sheet above which a report warns."""
-
-MASS = 1e-3
-"""Relative error of the mass above which a report warns."""
-
 FRAMES = 100
 """Approximate number of drawn states."""
 
@@ -35,7 +30,7 @@ CONTROLS = "pressure", "travel", "displacement"
 
 
 @dataclass
-class Record:
+class ReportData:
     """Data of a run with n states for its report, without the discretised problem.
 
     Attributes:
@@ -151,17 +146,17 @@ class Record:
                                      f" {value:g}; its last state has {last:.6g}."))
         if "penetration" in self.measures:
             deep, thickness = self.measures["penetration"].max(), self._smallest_thickness()
-            if thickness is not None and deep > PENETRATION * thickness:
-                begins = self._first(self.measures["penetration"] > PENETRATION * thickness)
-                found.append(Finding("warning" if deep > 4 * PENETRATION * thickness else "note", "penetration",
+            if thickness is not None and deep > LARGE_ERROR * thickness:
+                begins = self._first(self.measures["penetration"] > LARGE_ERROR * thickness)
+                found.append(Finding("warning" if deep > 4 * LARGE_ERROR * thickness else "note", "penetration",
                                      f"The body penetrates a tool by {deep:.3g}, {100 * deep / thickness:.2g} % of its"
                                      f" smallest thickness{begins}: a larger contact penalty reduces it."))
         worst = np.abs(self.measures["mass_error"]).max()
-        if worst > MASS:
-            found.append(Finding("warning" if worst > 10 * MASS else "note", "mass",
-                                 f"The mass changes by up to {100 * worst:.2g} %"
-                                 f"{self._first(np.abs(self.measures['mass_error']) > MASS)}: use a smaller eps or a"
-                                 f" finer mesh."))
+        if worst > NEGLIGIBLE:
+            begins = self._first(np.abs(self.measures["mass_error"]) > NEGLIGIBLE)
+            found.append(Finding("warning" if worst > 10 * NEGLIGIBLE else "note", "mass",
+                                 f"The mass changes by up to {100 * worst:.2g} %{begins}: use a smaller eps or a finer"
+                                 f" mesh."))
         found += [*self._volume_findings(), *self._admissibility_findings()]
         subjects = {finding.about for finding in found}      # these are on all states, `self.findings` on the last one
         found += [finding for finding in self.findings if finding.about not in subjects]
@@ -214,8 +209,8 @@ class Record:
         """Return the finding on the state in which the elements keep their volumes worst, in a list; else []."""
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
-        first = int(np.argmax(errors > volume.BOUND))
-        begins = f"; more than {100 * volume.BOUND:g} % from state {first} on" if first < k else ""
+        first = int(np.argmax(errors > NOTICEABLE))
+        begins = f"; more than {100 * NOTICEABLE:g} % from state {first} on" if first < k else ""
         where = f"state {k}, {self._control_of(k)}{begins}"
         clamped = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
         return clamped or volume.findings(errors[k], where)
@@ -237,7 +232,7 @@ class Record:
         return float(last.thickness.min()) if last is not None else None
 
 
-def of_path(path: Any) -> Record:
+def of_path(path: Any) -> ReportData:
     """Return the data of a run for its report from its `Path`; collective."""
     from ...scene.summary import summary
     problem, states, n = path.problem, path.states, len(path)
@@ -262,7 +257,7 @@ def of_path(path: Any) -> Record:
         stepping: dict = next((s.stepping for s in reversed(states) if s.stepping), {})
         tooling = Tooling.of_problem(problem)
         wall = path.wall() if profiles[-1] is not None else None
-        return Record(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
+        return ReportData(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
                       kinds, stages, measures, [list(s.history) for s in states], profiles, vars(path.counts),
                       target_column(stepping, measures), tooling,
                       [tooling.travels(s.setting, s.control) for s in states],
@@ -272,7 +267,7 @@ def of_path(path: Any) -> Record:
                       **_heat(plain(problem.scene.heat)))
 
 
-def of_checkpoint(about: dict, states: list[dict]) -> Record:
+def of_checkpoint(about: dict, states: list[dict]) -> ReportData:
     """Return the data of a run for its report from its checkpoint, without the scene.
 
     Both arguments are results of `formingx.results.files.checkpoint_data.contents`.
@@ -286,7 +281,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
     tooling = Tooling.of_description(about["scene"])
     measures = {c: np.array([s["measures"][c] for s in states]) for c in states[0]["measures"]}
     profiles = [s["profile"] and Profile(**{k: np.array(v) for k, v in s["profile"].items()}) for s in states]
-    return Record(about["summary"], about["versions"], about["scene"]["kinematics"]["kind"] == "Axisymmetric",
+    return ReportData(about["summary"], about["versions"], about["scene"]["kinematics"]["kind"] == "Axisymmetric",
                   [s["kind"] for s in states], [s["stage"] for s in states],
                   measures, [s["history"] for s in states], profiles, stepping.get("counts", {}),
                   target_column(stepping, measures), tooling,
@@ -299,7 +294,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> Record:
 
 
 def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
-    """Return {"heat": `Record.heat`, "unit": `Record.unit`}; empty for a scene without heat transfer.
+    """Return {"heat": `ReportData.heat`, "unit": `ReportData.unit`}; empty for a scene without heat transfer.
 
     Args:
         heat: heat transfer of the scene as plain data (`description.plain`), or None.
