@@ -1,4 +1,4 @@
-"""Compute exact derivatives of whole runs, beside differences of runs.
+"""Compute derivatives of whole runs by perturbed runs, beside differences of separate runs.
 
 Inflated sheet: radius 1, thickness 1/100, hinged at its rim, neo-Hookean, blown to a given pole height, as a membrane
 and as a solid. The derivatives are by b at b = 0, of its constant C = c10 = 0.5 (1 + b R^2) or (1 + b R^4), or of its
@@ -70,7 +70,7 @@ def pot(mu, travel, nose, c10, relaxing=False, elements=(24, 1)):
 
 
 def beside(design, values, name, step, radii, thickness):
-    """Return d(wall/thickness)/d(parameter) at some reference radii: exact, and by differences of whole runs."""
+    """Return d(wall/thickness)/d(parameter) at some reference radii: of one run, and by differences of whole runs."""
     run = design.run(values)
     R = run.profile.reference_radius
     exact = run.derivative("wall")[1][:, list(values).index(name)]

@@ -144,13 +144,13 @@ THESIS = [
     Row("force at 20 cm, hinged over clamped rim",
         "williams_plug/held_hinged/force_N_at_travel_cm/20 OVER williams_plug/held/force_N_at_travel_cm/20", None,
         "figure 6.10: small differences", style=".4f"),
-    Row("hoop stretch outside the plug, mean deviation from 1",
+    Row("frictionless plug at pole stretch 1.25, hoop stretch outside it, mean deviation from 1",
         "williams_plug/frictionless_at_pole_stretch_of_thesis/mean_hoop_deviation_outside_plug", 0.062, "figure 6.4",
         style=".3f"),
-    Row("wall under the plug over h0, least", "williams_plug/frictionless_at_pole_stretch_of_thesis/"
+    Row("the same, wall under the plug over h0, least", "williams_plug/frictionless_at_pole_stretch_of_thesis/"
         "flat_top_thickness_ratio/0", None, "figure 6.3: 0.3 to 0.7", style=".2f",
         note="undecided: the travel is not printed"),
-    Row("wall under the plug over h0, largest", "williams_plug/frictionless_at_pole_stretch_of_thesis/"
+    Row("the same, wall under the plug over h0, largest", "williams_plug/frictionless_at_pole_stretch_of_thesis/"
         "flat_top_thickness_ratio/1", None, "figure 6.3: 0.3 to 0.7", style=".2f",
         note="undecided: the travel is not printed"),
     Row("no slip, R of the largest stress on the top face", "plug_stress/held/standard/6/largest_sigma_1/R_cm", 1.905,
