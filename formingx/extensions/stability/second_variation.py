@@ -16,7 +16,8 @@ serves all n. At n = 0, V is torsion, and U and W give the tangent of the path. 
 (the mean of cos^2 round the axis is 1/2, not 1).
 
 Friction has no energy, and a follower pressure has one only on a closed face or with a fixed rim: the symmetric part of
-their tangents is used. A sliding point is free round the axis, which gives a lower bound of critical loads. A relaxing material has its instantaneous stiffness.
+their tangents is used. A sliding point is free round the axis, which gives a lower bound of critical loads. A relaxing
+material has its instantaneous stiffness.
 
 The unknowns are (U, W, V + m U, Q), with m = 1 for n = 1 and 0 else. So the quantity that vanishes on the axis is an
 unknown.
