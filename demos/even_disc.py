@@ -2,7 +2,7 @@
 
 A round sheet of radius 1 and thickness 1/100, hinged at its rim, neo-Hookean, as a membrane and as a solid. (a) The
 thickness h0(R) for an even wall h at a pole stretch l. (b) The constant C(R) (`c10`) for an even wall t h0, with a
-uniform h0. The logarithms of the profiles are cubic splines, found by the Gauss-Newton method with exact derivatives.
+uniform h0. The logarithms of the profiles are cubic splines, found by the Gauss-Newton method with derivatives of runs.
 Thickness and C are over their values at the pole, which do not change the shape.
 """
 

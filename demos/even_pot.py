@@ -2,7 +2,7 @@
 
 A clamped sheet of radius 3 cm and thickness 0.1 cm relaxes, and is softer where it is hotter. A plug pushes it into a
 mould 2.6 cm deep in half a second; air presses it onto the mould, to which it sticks, in another half. The goal is the
-smallest standard deviation over mean (cv) of the wall up to R = 2.7 cm. Seven numbers are found by exact derivatives
+smallest standard deviation over mean (cv) of the wall up to R = 2.7 cm. Seven numbers are found by derivatives of runs
 (`fx.Design`), and by the search of Nelder and Mead from the same start (`Study.refine`). Lengths in cm, stresses in
 MPa, times in s, temperatures in C.
 """
