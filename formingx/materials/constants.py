@@ -200,7 +200,8 @@ def varying(value: Any) -> Varying | None:
     """Return a constant that varies over the body as an object of `Varying`.
 
     Args:
-        value: the constant, in one of the forms that this module lists.
+        value: the constant: a number, a function f(R, Z) of the reference position, a UFL expression, a `table` over
+            the temperature, or an object of `Varying`.
 
     Returns:
         The object, or None if the constant is a number.

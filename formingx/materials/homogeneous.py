@@ -151,7 +151,7 @@ class Stability(NamedTuple):
 
     @property
     def stable(self) -> bool:
-        """True if both criteria hold in the whole examined range in every test."""
+        """True if the load criterion and Drucker's criterion hold in the whole examined range in every test."""
         return all(part == self.stretches for parts in (self.load, self.drucker) for part in parts.values())
 
     def __str__(self) -> str:

@@ -15,15 +15,15 @@ class IntegralLaw(Protocol):
     coefficients: Mapping[str, object]
 
     def history(self, forms: object, terms: object) -> object:
-        """Return the history of the material: its past states, from which the coefficients follow.
+        """Return the history of the material: its past states, from which the fields `coefficients` are computed.
 
         Args:
             forms: the `Formulation` of the body.
             terms: the `MaterialTerms` of the material.
 
         Returns:
-            A `formingx.forms.history.ConstitutiveHistory`. Its method `refresh()` updates the coefficients to the
-            current fields and time of the forms.
+            A `formingx.forms.history.ConstitutiveHistory`. Its method `refresh()` updates the fields
+            `coefficients` to the current displacements and time of the forms.
         """
 
     def unsymmetric_work(self, C: Sequence[object], dC: Sequence[object], coefficients: Mapping[str, object]) -> object:

@@ -43,8 +43,8 @@ class Material(Energies):
         parameters: {name: constant}, each a number or one of the varying constants in `formingx.materials.constants`.
         internal: internal variables at a quadrature point, {name: value in the reference configuration}. A value is a
             number, or nested tuples of the shape of the variable. Empty: no history.
-        motion_variables: names of internal variables that describe the motion in the last step and predict the rate in
-            the next. With their values in the reference configuration they predict no motion.
+        motion_variables: names of internal variables that describe the rate of deformation in the last step; a law
+            extrapolates it to the next step. Their values in `internal` stand for no motion.
         tensor_powers: {name: 1 or -1} of internal variables that are positive definite tensors with entries 11, 22, 12,
             33: 1 for a tensor like C, -1 for one like its inverse. They are transferred to another mesh relative to the
             deformed body, others as numbers.
@@ -128,7 +128,8 @@ class Material(Energies):
     def _moduli(self, constants: Any, n: int) -> np.ndarray:
         """Return the smallest and the largest small-strain shear modulus for n sets of constants, shape (2, n), stress.
 
-        The moduli hold for strains along the axes of the section; they are equal for an isotropic material.
+        The moduli hold for strains along the axes of the section; they are equal for an isotropic material. `constants`
+        has one entry for each constant, in the order of `parameters`: a number or an array of shape (n,).
         """
         H = self.response.logarithmic(np.ones((2, n)), constants)[1] / 2
         a, b = (H[0, 0] - 2 * H[0, 1] + H[1, 1]) / 2, (H[0, 0] + 2 * H[0, 1] + H[1, 1]) / 6

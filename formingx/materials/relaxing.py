@@ -337,10 +337,10 @@ class GeneralisedMaxwell(RelaxingMaterial):
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
-        """Return the data of earlier states that a step of the branches needs; None if no C is stored.
+        """Return the earlier deformation that the step of every branch needs (UFL), or None if it needs none.
 
-        By default they are the entries of the isochoric C at the beginning of the step. `internal` are the internal
-        variables there, and `time_step` is the length of the step.
+        By default it is the isochoric right Cauchy-Green tensor at the beginning of the step, its entries (11, 22, 12,
+        33). `internal` is {name: internal variable there}, and `time_step` the length of the step.
         """
         return entries(internal["C"]) if self._stores_C else None
 
@@ -355,9 +355,10 @@ class GeneralisedMaxwell(RelaxingMaterial):
     # the law of a branch: A is its internal variable, C the isochoric right Cauchy-Green tensor, both as entries
 
     def _metric(self, A: Entries) -> Entries:
-        """Return the entries of the tensor M of a branch with the internal variable A.
+        """Return the tensor M of a branch with the internal variable A, both as entries (11, 22, 12, 33).
 
-        F M F^T, with the isochoric F, is the elastic left Cauchy-Green tensor of the branch.
+        M is the inverse of A for `Viscoelastic`, and A for `TransientNetwork`. With the isochoric deformation gradient
+        F, the elastic left Cauchy-Green tensor of the branch is F M F^T.
         """
         raise NotImplementedError
 
@@ -369,23 +370,30 @@ class GeneralisedMaxwell(RelaxingMaterial):
         """Return the dissipated power of a branch over mu/(2 tau), for the isochoric C and the internal variable A."""
         raise NotImplementedError
 
-    def _step(self, C: Entries, before: Any, A: Entries, x: Any) -> Any:
-        """Return the potential of a branch over mu/2 for a step of length x = dt/tau.
+    def _step(self, C: Entries, past: Any, A: Entries, x: Any) -> Any:
+        """Return the potential of a branch in a step, over mu/2: its derivative by F gives the stress at the end.
 
-        C is isochoric at the end of the step, A the internal variable at its beginning, `before` the result of `_past`.
+        C is the isochoric right Cauchy-Green tensor at the end of the step, A the internal variable at its beginning.
+        `past` is the earlier deformation (`_past`), and x the length of the step over the relaxation time.
         """
         raise NotImplementedError
 
-    def _advanced(self, C: Entries, before: Any, A: Entries, x: Any) -> Entries:
-        """Return the internal variable of a branch at the end of a step of length x = dt/tau.
+    def _advanced(self, C: Entries, past: Any, A: Entries, x: Any) -> Entries:
+        """Return the internal variable of a branch at the end of a step, entries (11, 22, 12, 33).
 
-        C is isochoric at the end of the step, A the internal variable at its beginning, `before` the result of `_past`.
+        C is the isochoric right Cauchy-Green tensor at the end of the step, A the internal variable at its beginning.
+        `past` is the earlier deformation (`_past`), and x the length of the step over the relaxation time.
         """
         raise NotImplementedError
 
     @staticmethod
     def _flow(w: np.ndarray) -> np.ndarray:
-        """Return the flow law f(w) of branches (`branches.elastic_strains`) for strains w, shape (branches, 3)."""
+        r"""Return the flow law f(w) of branches with elastic logarithmic strains w, both of shape (branches, 3).
+
+        With the principal stretches l of the body and the relaxation time tau, the elastic strains change by
+
+        .. math:: \frac{dw_i}{dt} = \frac{d \ln l_i}{dt} - \frac{f_i(w)}{2 \tau}
+        """
         raise NotImplementedError
 
     def __repr__(self) -> str:

@@ -97,9 +97,10 @@ class Solidification(Material):
     def internal(self) -> dict[str, Any]:  # type: ignore[override]  # read only here
         """Internal variables, {name: value in the reference configuration}.
 
-        They are the variables of the base material, and, with the symbols of `Solidification`, C of the last two
-        states, A, and the fraction phi that A includes. Material that solidifies in a step is included from the
-        beginning of the next step, when the temperature at the end of the step is known.
+        They are the variables of the base material, the isochoric right Cauchy-Green tensors C of the last two states,
+        and A, the integral of C^-1 over the solidified fraction. The last one is the fraction phi that A includes. A
+        and phi include the material that solidifies in a step from the beginning of the next step, when the temperature
+        at the end of the step is known.
         """
         return {**self._base.internal, _BEFORE: IDENTITY, _LAST: IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
                 _FRACTION: 0.0}
@@ -149,12 +150,15 @@ class Solidification(Material):
         r"""Return the potential of a step in time, whose derivative by F is the nominal stress at the end of the step.
 
         Half of the material that solidifies in the step is stress-free in the shape at its beginning, half in the shape
-        at its end. A, C and phi are the symbols of `Solidification`, with the values n at the beginning of the step and
-        n + 1 at its end. If the fraction decreases, the part r of the solidified material remains:
+        at its end. If the solidified fraction phi decreases, the ratio r of the solidified material remains:
 
         .. math:: W_{base} + \frac{G}{2} \left[\mathrm{tr}(C M) - \mathrm{tr} M\right], \qquad
                   M = r A_n + \tfrac{1}{2} \max(\varphi_{n+1} - \varphi_n, 0) \, C_n^{-1}, \qquad
                   r = \min(1, \varphi_{n+1} / \varphi_n)
+
+        Indices n and n + 1 denote the beginning and the end of the step. C is the isochoric right Cauchy-Green tensor
+        at the end, and G the shear modulus of the solidified material. A is the integral of C^-1 over the solidified
+        fraction (`Solidification`). The first term is the potential of the base material.
 
         Args:
             F: deformation gradient at the end of the step (UFL, shape (3, 3)).
@@ -192,9 +196,14 @@ class Solidification(Material):
         return self._base.dissipation(F, self._of_base_internal(internal), **self._of_base(constants))
 
     def _begin(self, internal: dict[str, Any], constants: dict[str, Any]) -> tuple[Any, Any, Any]:
-        """Return tensor A (entries) and fraction phi at the beginning of a step, and phi at its end.
+        """Return the tensor A and the solidified fraction phi at the beginning of a step, and phi at its end (UFL).
 
-        They follow from the internal variables at the beginning of the step and the constants, each {name: value}.
+        A, entries (11, 22, 12, 33), is the integral of C^-1 over the solidified fraction, with the isochoric right
+        Cauchy-Green tensor C. It includes the material that solidified in the previous step.
+
+        Args:
+            internal: {name: internal variable at the beginning of the step}.
+            constants: {name: value at the end of the step, or in its middle for `flow_constants`}.
         """
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)
@@ -233,20 +242,25 @@ class _Fraction:
         return f"between=({self._low:g}, {self._high:g})" if self._table is None else f"fraction={self._table!r}"
 
 
-def _fraction(between: Any, table: Any) -> _Fraction:
-    """Return the solidified fraction phi(T) from the argument `between` or `fraction` of `Solidification`.
+def _fraction(between: Any, fraction: Any) -> _Fraction:
+    """Return the solidified fraction as a function phi(T) of the temperature, from one of two arguments.
 
-    Raise an InputError unless exactly one of them is given and allowed.
+    Args:
+        between: two temperatures, the lower first, between which phi decreases from 1 to 0; or None.
+        fraction: `table` of phi over T, from 1 to 0; or None.
+
+    Raises:
+        InputError: none or both are given, or the one that is given is not allowed.
     """
-    if (between is None) == (table is None):
-        raise InputError(f"Solidification: between = {between!r}, fraction = {table!r}: give one of them: the"
+    if (between is None) == (fraction is None):
+        raise InputError(f"Solidification: between = {between!r}, fraction = {fraction!r}: give one of them: the"
                          f" temperatures between=(75, 85) at which all and nothing has solidified, or a table of the"
                          f" fraction over temperature")
-    if table is not None:
-        y = check_type("Solidification: fraction", table, Table, "a table, such as table({75: 1, 80: 0.7, 85: 0})").y
+    if fraction is not None:
+        y = check_type("Solidification: fraction", fraction, Table, "a table, such as table({75: 1, 80: 0.7, 85: 0})").y
         if np.any(np.diff(y) > 0) or abs(y[0] - 1) > 1e-12 or abs(y[-1]) > 1e-12:
-            raise InputError(f"Solidification: fraction = {table!r}: must fall from 1 to 0 as the temperature rises")
-        return _Fraction(table.x[0], table.x[-1], table)
+            raise InputError(f"Solidification: fraction = {fraction!r}: must fall from 1 to 0 as the temperature rises")
+        return _Fraction(fraction.x[0], fraction.x[-1], fraction)
     ends = as_list("Solidification: between", between, "two temperatures")
     if len(ends) != 2 or finite("Solidification: between", ends[0]) >= finite("Solidification: between", ends[1]):
         raise InputError(f"Solidification: between = {between!r}: must be two temperatures, the lower first, as"
@@ -255,6 +269,8 @@ def _fraction(between: Any, table: Any) -> _Fraction:
 
 
 def _remaining(before: Any, after: Any) -> Any:
-    """Return the part (UFL) of the solidified material that remains when the fraction changes from `before` to `after`.
+    """Return the ratio of the solidified material that remains, when its fraction changes from `before` to `after`.
+
+    The ratio (UFL) is after/before if the fraction decreases, and 1 if it increases.
     """
     return ufl.conditional(ufl.lt(after, before), after / ufl.max_value(before, 1e-12), 1.0)

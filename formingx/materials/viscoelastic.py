@@ -72,29 +72,31 @@ class Viscoelastic(GeneralisedMaxwell):
     def _dissipated(self, C, Cv):
         return deviator_squared(C, self._metric(Cv))
 
-    def _step(self, C, before, Cv, x):
-        G, x = self._step_start(before, Cv, x)
+    def _step(self, C, past, Cv, x):
+        G, x = self._step_start(past, Cv, x)
         a, s = determinant(G), inner(cofactor(G), C) + x * inner(cofactor(C), G) + x**2
         p, q = a ** (1 / 3), (a + x * s) ** (1 / 3)
         return 3 * s / (q**2 + p * q + p**2) - 3
 
-    def _advanced(self, C, before, Cv, x):
-        G, x = self._step_start(before, Cv, x)
+    def _advanced(self, C, past, Cv, x):
+        G, x = self._step_start(past, Cv, x)
         grown = plus(G, C, x)
         scale = determinant(grown) ** (-1 / 3)
         return tuple(scale * g for g in grown)
 
-    def _step_start(self, before, Cv, x):
-        r"""Return G (entries) and x' of a step of second order, see `Viscoelastic`, from C_n, Cv_n and x = dt/tau.
+    def _step_start(self, past, Cv, x):
+        r"""Return the tensor G, entries (11, 22, 12, 33), and the number x' with which `Viscoelastic` states a step.
 
         .. math:: G = C_{v,n} + \frac{x}{2} C_n, \qquad
                   x' = \frac{x}{2} \left[1 + \frac{x}{3} \mathrm{tr}(C_n C_{v,n}^{-1})\right]
 
-        For a step of first order, without C_n, they are Cv_n and x.
+        Here x is the length of the step over the relaxation time. Cv_n is the internal variable at the beginning of the
+        step. `past` is C_n, the isochoric right Cauchy-Green tensor there. For a step of first order `past` is None:
+        then G = Cv_n and x' = x.
         """
-        if before is None:
+        if past is None:
             return Cv, x
-        return plus(Cv, before, x / 2), x / 2 * (1 + x / 3 * inner(before, cofactor(Cv)))
+        return plus(Cv, past, x / 2), x / 2 * (1 + x / 3 * inner(past, cofactor(Cv)))
 
     @staticmethod
     def _flow(w):
@@ -143,10 +145,18 @@ class TransientNetwork(GeneralisedMaxwell):
         return super().internal | {"change": (0.0,) * 4, "pace": 0.0}
 
     def _past(self, internal, time_step):
-        """Return C_n^-1, s (C_n^-1 - C_n-1^-1), s/(1 + s), the data of a step of `TransientNetwork`.
+        r"""Return the earlier deformation that a step of `TransientNetwork` needs: two tensors (entries) and a number.
 
-        Here n is the beginning of the step, and s its length over the length of the previous step. The last
-        two are 0 if the previous motion is unknown. The last is reduced if BDF2 would be unstable.
+        .. math:: C_n^{-1}, \qquad s \, (C_n^{-1} - C_{n-1}^{-1}), \qquad \frac{s}{1 + s}
+
+        C_n and C_n-1 are the isochoric right Cauchy-Green tensors at the beginning of the step and of the previous
+        step. The ratio of the lengths of both steps is s; it is 0 if the previous step is unknown. The number is
+        multiplied by 2 - s/2 for s from 2 to 4, and is 0 for larger s, because BDF2 would be unstable. It is also 0
+        where the tensor M of the step would not be positive definite.
+
+        Args:
+            internal: {name: internal variable at the beginning of the step (UFL, shape () or (4,))}.
+            time_step: length of the step (UFL scalar, time).
         """
         s, change = time_step * internal["pace"], entries(internal["change"])
         near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow faster make BDF2 unstable
@@ -175,9 +185,13 @@ class TransientNetwork(GeneralisedMaxwell):
         return plus(self._past_tensor(past, A, x), cofactor(C), 1 - _mean_decay(x) - past[2] * _parabola_weight(x))
 
     def _past_tensor(self, past, A, x):
-        r"""Return the tensor M (entries) of a step, see `TransientNetwork`, from `_past`, A_n and x = dt/tau.
+        r"""Return the tensor M with which `TransientNetwork` states a step, entries (11, 22, 12, 33).
 
-        .. math:: M = e^{-x} A_n + (m - e^{-x} + p) C_n^{-1} + p s (C_n^{-1} - C_{n-1}^{-1})
+        .. math:: M = e^{-x} A_n + (m - e^{-x} + p) C_n^{-1} + p s (C_n^{-1} - C_{n-1}^{-1}), \qquad
+                  m = \frac{1 - e^{-x}}{x}, \qquad p = \frac{x - 2 + (x + 2) e^{-x}}{x^2} \, \frac{s}{1 + s}
+
+        A_n is the internal variable at the beginning of the step, and x the length of the step over the relaxation
+        time. `past` is the earlier deformation (`_past`): the terms with C, and s/(1 + s).
         """
         before, change, share = past
         decay, p = ufl.exp(-x), share * _parabola_weight(x)
@@ -189,14 +203,20 @@ class TransientNetwork(GeneralisedMaxwell):
 
 
 def _mean_decay(x: Any) -> Any:
-    """Return m(x) = (1 - e^-x)/x (UFL), by its series for x < 0.01."""
+    """Return (1 - e^-x)/x (UFL), the mean of e^-x over a step of x relaxation times, by its series for x < 0.01."""
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)                            # the value that is not taken must be finite too
     return ufl.conditional(small, 1 - x / 2 + x**2 / 6 - x**3 / 24 + x**4 / 120 - x**5 / 720, (1 - ufl.exp(-y)) / y)
 
 
 def _parabola_weight(x: Any) -> Any:
-    """Return p(x) (1 + s)/s = [x - 2 + (x + 2) e^-x]/x^2 (UFL), by its series for x < 0.01."""
+    r"""Return the factor of the weight p of `TransientNetwork` that depends on x (UFL), by its series for x < 0.01.
+
+    .. math:: \frac{x - 2 + (x + 2) e^{-x}}{x^2}
+
+    Here x is the length of the step over the relaxation time. The other factor of p is s/(1 + s), with the ratio s of
+    the step to the previous one.
+    """
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)

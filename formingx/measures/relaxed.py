@@ -59,10 +59,11 @@ class PoleStressRatio:
                                                        for t in forms.terms)
 
     def evaluate(self) -> float:
-        """Return the ratio of stresses for the present fields of the problem; collective.
+        """Return the present Mises stress at the pole over the relaxed one, in the present state; collective.
 
         Returns:
-            The ratio; if both stresses are zero, the ratio of the moduli.
+            The ratio. If the relaxed stress is 0, both stresses belong to a small equibiaxial strain that is added.
+            For an undeformed body this is the ratio of the shear moduli before and after relaxation.
         """
         stored, relaxed, modulus = self._integrals()
         if relaxed < ROUND_OFF * modulus:
@@ -85,7 +86,12 @@ class PoleStressRatio:
         return self._problem.comm.allreduce(totals, MPI.SUM)
 
     def _expression(self, terms: Any) -> fem.Expression:
-        """Return the integrands of `_integrals` for a material (`MaterialTerms`), per unit of the reference cell."""
+        """Return the three stresses of `_integrals` at quadrature points, each times the volume per reference volume.
+
+        They are the present and the relaxed Mises stress, and the largest shear modulus. The volume is the reference
+        volume of the body, over the volume of the reference cell of the element. `terms` are the `MaterialTerms` of a
+        material.
+        """
         forms, e = self._problem.forms, self._strain
         F = ufl.variable(forms.elastic_F * ufl.diag(ufl.as_vector([1 + e, 1 - 2 * e, 1 + e])))
         deviators = [ufl.dev(ufl.diff(energy, F) * F.T) for energy in (terms.stored_energy(F),
@@ -135,7 +141,8 @@ class ElasticStretches:
             cells: number of locally owned cells.
 
         Returns:
-            Stretches, shape (cells, n, count); nan in cells of materials with fewer branches.
+            Stretches at the n points of each cell, shape (cells, n, branches), with the largest number of branches of a
+            material (`count`). They are nan for branches that the material of a cell does not have.
         """
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:

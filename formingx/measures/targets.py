@@ -16,7 +16,8 @@ _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 class Amplitude(Quantity):
     """Output quantity that is a pressure, a travel, the process time or the control itself.
 
-    While a load is activated or deactivated, it is the part of the load that acts on the body.
+    Between two stages the control goes from 0 to 1 and activates or deactivates loads. The quantity of such a load is
+    then the load times the control, or times 1 - control.
 
     Args:
         problem: the `Problem`.
@@ -41,7 +42,7 @@ class Amplitude(Quantity):
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
     def _amplitude(self, control: float) -> float:
-        """Return the quantity over its scale at a value of the control; the process time in the user's unit of time."""
+        """Return the quantity divided by its scale, which is 1 for time and control, at a value of the control."""
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -68,7 +69,8 @@ class Amplitude(Quantity):
             target: the target value, in the user's units.
 
         Returns:
-            Function as in `Quantity.equation`.
+            Function of the unknowns x, the control and a PETSc vector, which it sets to dc/dx = 0. It returns the
+            dimensionless residual c and its derivative by the control.
         """
         setting = self._problem.setting
         slope = 1.0 if self._number is None else setting.rate[self._number]
@@ -149,10 +151,10 @@ def process_time(value: float) -> Target:
 
 
 def change_completed() -> Target:
-    """Return the target of the transition between two stages with other active loads, supports or tools.
+    """Return the target at which the transition between two stages ends.
 
-    The change leaves forces out of balance. They decrease to 0 while the control goes from 0 to its target 1
-    (`StepData.fading`).
+    There is a transition if the second stage activates or deactivates a load, a support or a tool. The change leaves
+    forces out of balance, which decrease to 0 while the control goes from 0 to 1. The target is the control 1.
 
     Returns:
         The target.
@@ -347,7 +349,8 @@ def bind_volume(problem: Any, form: Any = None) -> Quantity:
 def _volume(problem: Any, form: Any = None) -> Quantity:
     """Return the volume swept by the loaded face of the modelled body as an output quantity.
 
-    On a remeshed body it includes the volume that the face swept on earlier meshes. form: as in `bind_volume`.
+    On a remeshed body it includes the volume that the face swept on earlier meshes. `form` is the integral, the result
+    of `swept_volume`; None to build it.
     """
     earlier = 0.0
     if problem.scene.state_transfer is not None:

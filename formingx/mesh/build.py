@@ -125,15 +125,16 @@ def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -
 
 def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coordinates: np.ndarray,
                  through: list[np.ndarray], body: Callable[[np.ndarray, list[np.ndarray]], Mesh]) -> Mesh:
-    """Return the mesh with a `Preset`, with which a `Scene` divides the same body into other elements.
+    """Return the mesh with a `Preset`, which stores the accuracy and how to mesh the same body with other elements.
 
     Args:
         mesh: the mesh.
         accuracy: "draft", "standard" or "fine".
-        layers: {name: thickness as a function of coordinates}.
-        coordinates: coordinates along the sheet at which the largest thickness is sought, shape (n,).
-        through: ends of the elements through each layer on [0, 1].
-        body: function of ends of the columns and ends of the elements through each layer on [0, 1]; returns the mesh.
+        layers: {name: thickness, length, as a function of coordinates along the sheet, such as the radius of a disc}.
+        coordinates: coordinates at which the largest thickness is sought, shape (n,).
+        through: ends of the k elements through each layer, from 0 to 1, shape (k + 1,).
+        body: function that returns a mesh. Its arguments are the coordinates of the ends of the columns, shape
+            (columns + 1,), and the ends of the elements through each layer in the form of `through`.
     """
     thickness = np.array([thickness_at(coordinates).max() for thickness_at in layers.values()])
     return replace(mesh, preset=Preset(accuracy, thickness, tuple(len(ends) - 1 for ends in through), lambda ends, n:

@@ -20,10 +20,11 @@ class Columns(NamedTuple):
     """Columns of elements along a sheet, and the functions that make the same body with other columns.
 
     Attributes:
-        ends: ends of the columns in a coordinate along the sheet, shape (n + 1,).
-        fixed: ends that must be kept, shape (m,).
+        ends: coordinates of the ends of the n columns along the sheet, such as radii of a disc, shape (n + 1,).
+        fixed: coordinates of m ends that must be kept, shape (m,).
         faces: names of the boundaries that contain the first and the last row of nodes.
-        place: function of coordinates, shape (k,), that returns the nodes of all rows, shape (rows, k, 2), length.
+        place: function of k such coordinates, shape (k,), that returns the nodes of all rows through the sheet, shape
+            (rows, k, 2), length.
         make: function of other ends that returns the mesh.
     """
 

@@ -31,19 +31,21 @@ def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
     return np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
 
 
-def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, pieces: np.ndarray) -> np.ndarray:
+def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     """Return the ends of columns of elements with given lengths, as coordinates along the sheet, shape (columns + 1,).
+
+    The coordinate is any number that increases along the sheet, such as the radius of a disc (`Columns.ends`).
 
     Args:
         coordinates: coordinates of n points along the sheet, shape (n,).
-        s: length along the sheet to each point, shape (n,), length.
+        s: length along the sheet from its start to each point, shape (n,), length.
         size: largest length of a column at each point, shape (n,), length.
-        pieces: ascending coordinates at which columns must end, with the first and the last, shape (m,).
+        fixed: ascending coordinates of m ends that must be kept, among them the first and the last, shape (m,).
     """
     number = number_of_columns(s, size)
-    marks = np.interp(pieces, coordinates, number)
-    ends = [pieces[:1]]
-    for a, b, last in zip(marks, marks[1:], pieces[1:]):
+    marks = np.interp(fixed, coordinates, number)
+    ends = [fixed[:1]]
+    for a, b, last in zip(marks, marks[1:], fixed[1:]):
         n = max(int(np.ceil(b - a - 1e-6)), 1)
         ends += [np.interp(a + (b - a) * np.arange(1, n) / n, number, coordinates), np.array([last])]
     return np.concatenate(ends)

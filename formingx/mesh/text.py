@@ -71,10 +71,10 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """Return the grid in a text file; clockwise elements become counter-clockwise.
+    """Return the grid in a text file of `write`; clockwise elements become counter-clockwise.
 
     Raises:
-        InputError: the file is missing or not in this format; the message names the line.
+        InputError: the file is missing, or does not have the format "six-node triangles"; the message names the line.
     """
     lines = _Lines(os.fspath(file))
     *first, version = next(lines, None) or [""]
@@ -146,9 +146,12 @@ def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray)
 
 
 def _checked_numbering(numbering: str, lines: _Lines | None = None) -> str:
-    """Return `numbering`, which must be "corners" or "around".
+    """Return the name of the order of the six nodes of an element, checked.
 
-    lines: lines of the file that is read, for messages; None when a file is written.
+    Args:
+        numbering: "corners" (the three corners, then the middles of the edges) or "around" (corner, middle, corner, ...
+            along the boundary of the element).
+        lines: lines of the file that is read, for messages; None when a file is written.
 
     Raises:
         InputError: the numbering is unknown.

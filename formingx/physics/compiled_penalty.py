@@ -122,6 +122,8 @@ def compiled() -> Any:
     """Compile the contact equations of the penalty law (`formingx.physics.penalty.Law`) in C, once.
 
     Returns:
-        Library with the functions `ramp`, `elastic_slips` and `tractions`. Their arguments are addresses of arrays.
+        Library with three functions: `ramp` computes the function F of the normal traction, `elastic_slips` the elastic
+        slips with their gradients, and `tractions` the tractions with their stiffness. Arrays for input and output are
+        passed by their addresses.
     """
     return functions("penalty", _HEADER, _SOURCE)

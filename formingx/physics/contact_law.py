@@ -35,7 +35,7 @@ class ContactHistory(NamedTuple):
 
     Attributes:
         position: positions, shape (n, c), length.
-        distance: signed distances from the tool, shape (n,), length.
+        distance: signed distances from the tool, positive inside, shape (n,), length.
         slip: elastic slips g, shape (n,), length.
         closure: predicted position of an open point when its gap closes in the next step, shape (n, c), length. NaN
             excludes the point from friction in that step.
@@ -87,7 +87,7 @@ class Motion(NamedTuple):
 
     Attributes:
         position: positions relative to the tool at which the other values hold, shape (n, c), length.
-        distance: signed distances from the tool, shape (n,), length.
+        distance: signed distances from the tool, positive inside, shape (n,), length.
         normal: gradients of the distance, shape (n, c).
         slip: elastic slips, shape (n,), length.
         along: gradients of the slip, shape (n, c).
@@ -118,7 +118,7 @@ class Motion(NamedTuple):
             x: new positions of the points relative to the tool, shape (n, c), length.
 
         Returns:
-            Signed distances, shape (n,), length.
+            Signed distances, positive inside the tool, shape (n,), length.
         """
         return self.distance + np.einsum("ni,ni->n", self.normal, x - self.position)
 
@@ -134,13 +134,15 @@ class ContactLaw:
     * `stiffness_ahead` at an accepted state, for the tangent towards the next step.
     * `distance`, `nearest` and `ramp` for the limits of the next step.
 
-    A law derives from this class and defines `theta`, `start`, `touching`, `tractions`, `distance` and `part`. Other
-    methods without a default are needed only for friction, for a section, or if some points are kept open.
+    A law derives from this class and defines `theta`, `start`, `touching`, `tractions`, `distance` and `part`. A law of
+    a section also defines `nearest` and, for the stability of axisymmetric bodies, `hoop_stiffness`. It defines
+    `without` if the solver keeps points open for a step.
 
     Attributes:
         theta: half-width of the contact ramp, length: contact begins at the signed distance -theta.
         elastic_slip: elastic slip at which a point begins to slide, length.
-        shift: reduction of the signed distances, length, a number or one for each point, shape (n,).
+        shift: length by which signed distances are reduced, a number or one for each point, shape (n,): points that
+            touch the tool in the reference configuration are then free of stress.
         has_friction: True if tractions depend on the slip.
         has_history: True if tractions depend on the history variables (`ContactHistory`).
         adhesive: True if points in contact can carry tension; `energy` is then the energy of the bond (`Path.work`).
@@ -158,7 +160,7 @@ class ContactLaw:
 
     @property
     def profile(self) -> Tool | None:
-        """Tool of lines and arcs whose distance, less `shift`, is the distance of the law; None for other distances."""
+        """Tool of lines and arcs whose signed distance, less `shift`, is `distance`; None for other distances."""
         return None
 
     @property
@@ -192,7 +194,7 @@ class ContactLaw:
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and elastic slips of the points with their gradients.
 
-        By default all are 0, which is enough for a law that is linear in x.
+        `tractions` linearises the law there. By default all are 0, for a law that is linear in x.
 
         Args:
             x: positions relative to the tool, shape (n, c), length.
@@ -250,7 +252,7 @@ class ContactLaw:
         raise NotImplementedError
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distances of points from the tool, positive inside, less `shift`.
+        """Return the signed distances of points from the tool, positive inside, less the length `shift` of the law.
 
         Args:
             x: positions relative to the tool, shape (n, c), or m positions of each point, shape (m, n, c), length.
@@ -267,8 +269,8 @@ class ContactLaw:
             x: positions relative to the tool, shape (n, c), length.
 
         Returns:
-            Signed distances as in `distance`, shape (n,), length; unit normals (gradients of the distance), shape
-            (n, c); curvatures, shape (n,), 1/length.
+            Signed distances less `shift`, positive inside the tool, shape (n,), length; unit normals (gradients of the
+            distance), shape (n, c); curvatures, shape (n,), 1/length.
         """
         raise NotImplementedError
 
@@ -280,7 +282,7 @@ class ContactLaw:
         N is the normal traction and k the penalty.
 
         Args:
-            d: signed distances from the tool, shape (n,), length.
+            d: signed distances from the tool, positive inside, shape (n,), length.
             bonded: mask of the points that cannot separate, shape (n,), or False.
 
         Returns:
@@ -305,7 +307,7 @@ class ContactLaw:
         raise NotImplementedError
 
     def without(self, points: np.ndarray) -> ContactLaw:
-        """Return a copy of the law that gives no traction at some points, for any position (mask, shape (n,))."""
+        """Return a copy of the law with zero traction at some points in any position; mask of points, shape (n,)."""
         raise NotImplementedError
 
     def with_friction(self, mu: np.ndarray | float) -> Self:
@@ -314,18 +316,19 @@ class ContactLaw:
 
 
 class NormalLaw(ContactLaw):
-    r"""Contact law without friction and history: the normal traction N is a function of the signed distance d.
+    r"""Contact law without friction and history: the normal traction N follows from the signed distance d.
 
     .. math:: N = k F(d)
 
-    A subclass defines `ramp`, which returns F and dF/dd, and `stored`, the integral of F.
+    The distance is positive inside the tool. A subclass defines `ramp`, which returns F and dF/dd, and `stored`, the
+    integral of F.
 
     Args:
         tool: the tool, which gives the signed distance.
         k: penalty, stress/length, a number or one for each point, shape (n,).
         theta: half-width of the contact ramp, length: contact begins at the signed distance -theta.
-        shift: reduction of the signed distances, length, a number or one for each point, shape (n,). With a shift a
-            point that touches in the reference configuration begins at the outer edge of the ramp, free of stress.
+        shift: length by which signed distances are reduced, a number or one for each point, shape (n,). A point that
+            touches in the reference configuration is then at the outer edge of the ramp, free of stress.
     """
 
     def __init__(self, tool: PlaneTool, k: np.ndarray | float, theta: float, shift: np.ndarray | float = 0.0):
@@ -341,8 +344,10 @@ class NormalLaw(ContactLaw):
 
         .. math:: \int_{-\theta}^{d} F(s) \, ds
 
+        F is the result of `ramp`. Contact begins at the distance -theta.
+
         Args:
-            d: signed distances from the tool, shape (n,), length.
+            d: signed distances from the tool, positive inside, shape (n,), length.
 
         Returns:
             Integral, shape (n,), length^2; 0 for open points.
@@ -371,7 +376,7 @@ class NormalLaw(ContactLaw):
             x: positions relative to the tool, shape (n, 2), length.
 
         Returns:
-            Signed distances less `shift`, unit normals and curvatures of the tool, see `ContactLaw.nearest`.
+            Signed distances less `shift`, positive inside the tool, with unit normals and curvatures of the tool.
         """
         positions = x.tobytes()
         for known, near in self._near:

@@ -353,9 +353,9 @@ def sum_of_powers(F, alpha):
     .. math:: (m + d)^a + (m - d)^a
 
     is even in d. Near d = 0 its series in x = (d/m)^2 avoids 0/0 in value and derivatives. Elsewhere the small
-    eigenvalue is det C / (m + d), which loses no digits in a thin sheet, as m - d does. At the switch x = 1e-4, five
-    terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5 to 10). The F of
-    a non-axisymmetric mode also has entries 13, 23, 31 and 32; the sum is exact to second order in these.
+    eigenvalue is computed as det C / (m + d), because m - d would lose digits in a thin sheet. At the switch x = 1e-4,
+    five terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5 to 10). The
+    sum includes the entries 13, 23, 31 and 32, which a non-axisymmetric mode adds to F, to second order.
 
     Args:
         F: deformation gradient (UFL, shape (3, 3)).
@@ -397,7 +397,7 @@ def _powers_across(F, b, a):
               = a \, (x c)^{(s - 1)/2} \, \frac{\sinh(s y)}{\sinh y}, \quad s = a - 1, \quad y = \tfrac{1}{2} \ln(x/c)
 
     The second form loses no digits where stretches coincide. At b = 0 the terms are exact in value and in first and
-    second derivatives by all entries of F. The half difference of the eigenvalues is at least 1e-8 of their mean.
+    second derivatives by F. Eigenvalues of A differ by at least 2e-8 of their mean, which avoids 0/0.
     """
     F2, c, s = ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]]), F[2, 2] ** 2, a - 1
     A = F2.T * F2

@@ -205,11 +205,11 @@ class MixedPressure(Model):
             raise InputError(f"Scene: {found}")
 
     def locking(self, mesh):
-        r"""Estimate how much slender triangles across a thick sheet stiffen its bending; collective.
+        r"""Estimate how much narrow, high triangles through a thick sheet stiffen its bending; collective.
 
-        The inf-sup constant of "P1dg" decreases as 2 width/height of the triangles. For hinged sheets 2 to 15 times
-        wider than thick, each triangle causes a relative error of the bending stiffness of at most
-        (benchmarks/thickness.py)
+        The height of a triangle is its longest edge, and its width the altitude on this edge. The inf-sup constant of
+        "P1dg" decreases as 2 width/height. For hinged sheets 2 to 15 times wider than thick, each triangle causes a
+        relative error of the bending stiffness of at most (benchmarks/thickness.py)
 
         .. math::
             0.3 \, \frac{\text{height}}{\text{width}}

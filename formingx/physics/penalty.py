@@ -36,7 +36,7 @@ class Law(NormalLaw):
         k: penalty, shape () or (n,), stress/length.
         theta: half-width of the ramp, length: contact begins at the signed distance -theta.
         elastic_slip: elastic slip g_s at which a point begins to slide, length; not used by stick.
-        shift: reduction of the signed distances, length, shape () or (n,).
+        shift: length by which the signed distances are reduced, shape () or (n,).
         adhesive: True if points in contact never separate and can carry tension.
         shear_limit: function of pressure and mu that returns the shear stress at which points slide and its derivative,
             see `Contact.shear_limit`; None for Coulomb's mu p.
@@ -69,7 +69,7 @@ class Law(NormalLaw):
         return law
 
     def _set_friction(self, mu: np.ndarray | float) -> None:
-        """Set the coefficients of friction and the flags that depend on them."""
+        """Set the coefficients of friction mu, shape () or (n,), and whether the law has friction and history."""
         self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.has_history = self.has_friction or self.adhesive
@@ -111,7 +111,7 @@ class Law(NormalLaw):
         F times the penalty k is the normal traction. For a contact that does not separate, F is max(d + theta, 0).
 
         Args:
-            d: signed distances from the tool, shape (n,), length.
+            d: signed distances from the tool, positive inside, shape (n,), length.
             bonded: mask of the points that have been in contact and cannot separate, shape (n,), or False. There F is
                 d + theta, which may be negative (tension).
 
@@ -146,9 +146,10 @@ class Law(NormalLaw):
 
     @property
     def friction(self) -> np.ndarray:
-        """Ratio of tangential to normal traction at which a point slides, for vanishing pressure, shape () or (n,).
+        """Ratio of tangential to normal traction at which a point slides, shape () or (n,).
 
-        It is infinite where the point sticks.
+        It is infinite where the point sticks. If the contact has a shear limit that is no constant ratio, this is the
+        ratio for a pressure that tends to 0.
         """
         sticks, mu = np.asarray(self.sticks), np.asarray(self.mu)
         if self.shear_limit is not None:
@@ -197,12 +198,12 @@ class Law(NormalLaw):
         Args:
             x: positions relative to the tool, shape (n, 2), length.
             old: history variables of the last accepted state; not used without friction and bond.
-            sense: sense of sliding in the previous Newton iteration, shape (n,). A point whose sense would reverse
-                sticks for this one iteration; otherwise Newton's method would alternate across the narrow range of
-                stick.
-            expected: distances and slips at which the law is linearised, as the previous iteration predicted them.
-                None: the distances and slips at x. These differ from the predicted ones by the curvature of tool and
-                motion, which a stiff penalty multiplies.
+            sense: sense of sliding in the previous Newton iteration, shape (n,): 1 or -1 along the tangent of the tool,
+                0 for a sticking point. A point whose sense would reverse sticks for this one iteration. Otherwise
+                Newton's method would alternate between both senses.
+            expected: distances and slips at which the law is linearised, as the previous iteration predicted them to
+                first order. None: the distances and slips at x, which on a curved tool differ from them in second
+                order. A stiff penalty turns this difference into large tractions.
 
         Returns:
             Tractions, with their stiffness and the new history variables.
@@ -214,9 +215,11 @@ class Law(NormalLaw):
 
     def _evaluate(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> np.ndarray:
-        """Return the output of the C function `tractions` at positions x, one array of shape (12 n,).
+        """Return the output of the C function `tractions` at n positions x, one array of shape (12 n,).
 
-        It has force (2 n), N, T, sense (n each), stiffness (4 n), distance, slip and tangential stiffness (n each).
+        In this order it has the traction vectors (2 n), normal tractions, tangential tractions and senses of sliding (n
+        each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each). Arguments are those
+        of the method `tractions`.
         """
         near, out = self.nearest(x), np.empty(12 * len(x))
         before, g, dg, limit, grows = NULL, NULL, NULL, NULL, NULL
@@ -275,9 +278,9 @@ class Law(NormalLaw):
     def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
         """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
 
-        A point whose gap just closed lies at the outer edge of the ramp, where it has no stiffness. With this stiffness
-        a sticking point would slip along the tangent of the path. Its stiffness is therefore evaluated halfway between
-        the outer edge and distance 0.
+        A point whose gap just closed has the signed distance -theta, at which the contact ramp begins and the stiffness
+        is 0. On the tangent of the path a sticking point without stiffness would slip. Its stiffness is therefore
+        evaluated halfway, at the distance -theta/2.
 
         Args:
             x: positions relative to the tool, shape (n, 2), length.
@@ -318,6 +321,11 @@ class Law(NormalLaw):
 
 
 def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:
-    """Return the `ContactHistory` of points at x, shape (n, 2), with distances d and slips, shape (n,); `closure` is x.
+    """Return the `ContactHistory` of n points; the predicted positions at gap closure are set to the present ones.
+
+    Args:
+        x: positions, shape (n, 2), length.
+        d: signed distances, positive inside the tool, shape (n,), length.
+        slip: elastic slips, shape (n,), length.
     """
     return ContactHistory(x, d, slip, x)

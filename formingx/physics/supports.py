@@ -16,7 +16,8 @@ class Constrained(NamedTuple):
     """Constraint of one displacement component to 0, at all nodes of a boundary or at one node.
 
     Attributes:
-        component: number of the component: 0 for r (x in three dimensions), 1 for z, 2 for y, 3 for x (`NAMES`).
+        component: number of the component in `NAMES`: 0 for r, 1 for z, 2 for y, 3 for x. A body in three dimensions
+            has no r: there 0 also means x.
         on: name of the boundary, or None.
         point: reference position of the node, (r, z), length, or None.
         driven: True if the component has a prescribed value, a load parameter (control) of the run, instead of 0.

@@ -54,7 +54,7 @@ class _Reader:
         kind: "step" or "brep".
 
     Attributes:
-        bounds: {number of a curve: [lowest, highest parameter]}.
+        bounds: {number of a curve: [lowest, highest value of its curve parameter]}.
     """
 
     def __init__(self, file: str, kind: str):
@@ -66,7 +66,7 @@ class _Reader:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
 
     def __enter__(self) -> _Reader:
-        """Wait until the process has read the file, set `bounds`, and return the reader."""
+        """Wait until the separate process has read the file, store the parameter ranges, and return the reader."""
         try:
             self.bounds = {int(tag): ends for tag, ends in self._answer()["curves"].items()}
         except BaseException:
@@ -75,7 +75,7 @@ class _Reader:
         return self
 
     def __exit__(self, *_: Any) -> None:
-        """End the process."""
+        """End the separate process."""
         self._process.kill()
         self._process.communicate()
 
@@ -85,7 +85,7 @@ class _Reader:
         return np.array(points).reshape(-1, 3), np.array(derivatives).reshape(-1, 3)
 
     def _answer(self, question: Any = None) -> Any:
-        """Send `question` to the process, if it is not None, and return the next line of the process, as JSON data.
+        """Send a question to the separate process, if it is not None, and return its next line of output, as JSON data.
 
         Raises:
             InputError: the process reports an error, crashes, or takes too long.

@@ -71,7 +71,8 @@ def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
     Args:
         entity: the curve, an entity of ezdxf.
-        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, length, or None.
+        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, length. None: arcs may
+            not replace them, so they are unsupported.
         name: beginning of the error message.
 
     Raises:

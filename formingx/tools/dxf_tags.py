@@ -23,17 +23,19 @@ _LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATT
 
 
 def check(file: str, others: tuple[str, ...]) -> Counter:
-    """Check the curves of a drawing.
+    """Check that every curve of a drawing has all its data, and count the curves.
+
+    Curves are lines, arcs, circles, polylines, ellipses and splines.
 
     Args:
         file: name of the file.
-        others: kinds of entities that are not checked.
+        others: further kinds of entities that the drawing may contain, such as "3DFACE"; they are not examined.
 
     Returns:
-        {kind: number of its curves}.
+        {kind of a curve, such as "LINE": number of curves}.
 
     Raises:
-        ValueError: the drawing is damaged; the message names the line.
+        ValueError: the drawing is damaged, or has an entity of an unknown kind; the message names the line.
     """
     data = Path(file).read_bytes()
     if data.startswith(b"AutoCAD Binary DXF"):
@@ -75,7 +77,7 @@ def _check_entity(kind: str, tags: list[tuple[int, str]], line: int, others: tup
         kind: kind of the entity, such as "LINE".
         tags: (group code, value) of each tag.
         line: number of lines up to the end of the entity.
-        others: kinds of entities that are not checked.
+        others: further kinds of entities that the drawing may contain, which are not examined.
 
     Raises:
         ValueError: the kind is unknown, or a tag is missing or occurs twice; the message names the line.

@@ -64,7 +64,7 @@ def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
 
 
 class _Drawing:
-    """Points, curves and named numbers of a script; `add` reads one statement.
+    """Points, curves and named numbers of a gmsh script (.geo); `add` reads one statement.
 
     Attributes:
         values: {name: number}.
@@ -78,7 +78,7 @@ class _Drawing:
         self.curves: dict[int, Line | Arc | str] = {}
 
     def add(self, statement: str) -> None:
-        """Add the points, curve or number that one statement of a script defines.
+        """Add the point, curve or named number that one statement of the gmsh script defines.
 
         Raises:
             ValueError: the statement is not supported.
@@ -208,10 +208,10 @@ class _Drawing:
 
 
 def _real(value: Any) -> float:
-    """Return the result of an operation, a float.
+    """Return the result of an operation between numbers of a script, such as a power, as a float.
 
     Raises:
-        ValueError: the result is complex.
+        ValueError: the result is complex: the operation is the root of a negative number.
     """
     if isinstance(value, complex):
         raise ValueError("a root of a negative number")

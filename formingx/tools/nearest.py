@@ -70,9 +70,10 @@ def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, n
 
     Args:
         x: points, shape (n, 2), length.
-        table: pieces of the profile, lines first, shape (m, 9). The columns are: origin (R, Z), direction (R, Z; 0 for
-            arcs), sense (0 for lines), lowest and highest coordinate along the piece. The last two belong to arcs:
-            radius and first angle.
+        table: the m pieces of the profile, lines first, shape (m, 9). A line has an origin (R, Z), a direction (R, Z),
+            0, lowest and highest length along it from the origin, 0, 0. An arc has its centre (R, Z), 0, 0, sense, 0,
+            angle of the arc, radius, polar angle of its first point. The sense is 1 if the arc turns left, else -1;
+            angles are in radians.
         lines: number of lines.
 
     Returns:

@@ -83,7 +83,7 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
         points: corners (R, Z), shape (n, 2), length.
         radii: fillet radius of each corner, length.
         closed: True to join the last corner to the first.
-        each: True if every point with a fillet must be a corner.
+        each: True to refuse a fillet at a point where the polyline goes straight on; False to ignore this fillet.
 
     Raises:
         InputError: a fillet has no corner, or is too large.
@@ -129,7 +129,10 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
 
 def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn: float, first: bool,
             second: bool) -> Arc:
-    """Return the arc that rounds a corner; half of it at an open end on the axis.
+    """Return the arc that rounds a corner between two edges.
+
+    At an open end on the axis R = 0, only one of the edges exists, and the other is its mirror image. There the half of
+    the arc on the side of the existing edge is returned.
 
     Args:
         corner: the corner (R, Z), shape (2,), length.
@@ -137,8 +140,8 @@ def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn
         cut: length by which the arc shortens each edge at the corner, length.
         incoming: direction of the edge before the corner, radians.
         turn: angle between the edges, positive to the left, radians.
-        first: True if there is an edge before the corner.
-        second: True if there is an edge after the corner.
+        first: True if the edge before the corner exists, False at the first point of an open profile.
+        second: True if the edge after the corner exists, False at the last point of an open profile.
     """
     side = math.copysign(1.0, turn)
     start = corner - cut * np.array([math.cos(incoming), math.sin(incoming)])

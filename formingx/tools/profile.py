@@ -252,11 +252,12 @@ class Tool:
         self.table = np.array([(*row, 0.0, 0.0) for row in rows] + arcs)
 
     def _ends(self) -> tuple:
-        """Return the corners that the profile and its mirror image form on R = 0, at the first and the last end.
+        """Return the corners that the profile and its mirror image form on the axis R = 0.
 
         Returns:
-            For each end (point, angle by which the mirrored profile turns there, radians), or None where the profile
-            continues along its end piece. A closed profile has two corners of angle 0.
+            For the first and the last end: point (R, Z), and angle from the profile to its mirror image, radians. None
+            for an end off the axis, or one that meets its mirror image without a corner. There the end piece is
+            extended. A closed profile has no ends: its two points with angle 0 are no corners.
         """
         if self.closed:
             return (np.zeros(2), 0.0), (np.zeros(2), 0.0)

@@ -115,7 +115,7 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
 
 
 def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
-    """Return a flat-ended plug that points down.
+    """Return a flat-ended plug that points down; signed distances are positive inside it.
 
     Args:
         radius: radius of the plug, length.

@@ -41,8 +41,11 @@ class PlaneTool(RigidTool, Protocol):
     """Rigid tool of a section; it is smooth between corners, so its distance has derivatives."""
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """Return the signed distance of points from the surface, with its gradient and curvature (`Nearest`).
+        """Return the signed distance of points from the surface, with its gradient and curvature.
 
         Args:
             x: points, shape (n, 2), length.
+
+        Returns:
+            Distances, positive inside the tool, gradients and curvatures (`Nearest`).
         """
