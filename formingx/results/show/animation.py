@@ -29,8 +29,8 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
         units: units for the labels.
 
     Raises:
-        InputError: the name has another ending, ffmpeg is missing for an MP4, `frames` or `seconds` is not positive,
-            the body is not a sheet, or the path has one state only.
+        InputError: the name has another ending, or ffmpeg is missing for an MP4. `frames` or `seconds` is not positive.
+            The body is not a sheet, or the path has one state only.
         OSError: the file cannot be written.
     """
     file = files.named("animate", file, ".gif", ".mp4")
