@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import dolfinx
@@ -77,10 +77,13 @@ def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
         _compiled.update(_jit.compile_together(comm, items, options, form_options))
 
 
-def _compiled_by_jit(compiled: Any) -> Any:
-    """Return the result of `compiled()`, in which DOLFINx requests a form or an expression and `_jit` compiles it.
+def _compiled_by_jit(request: Callable[[], Any]) -> Any:
+    """Return a form or an expression that DOLFINx makes, with `_jit` in place of the compiler of DOLFINx.
 
     Each form is compiled once in a process.
+
+    Args:
+        request: function that calls DOLFINx for the form or expression and returns it.
     """
     compiler = jit.ffcx_jit
 
@@ -96,7 +99,7 @@ def _compiled_by_jit(compiled: Any) -> Any:
         return _compiled[key]
     jit.ffcx_jit = compile_once
     try:
-        return compiled()
+        return request()
     finally:
         jit.ffcx_jit = compiler
 

@@ -152,7 +152,14 @@ def _declarations(scalar: str) -> cffi.FFI:
 
 
 def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], form_options: dict[str, Any]) -> None:
-    """Build one library with all items, and link it in the cache `folder` under the key of each item."""
+    """Build one library with all items, and link it in the cache under the key of each item.
+
+    Args:
+        items: {key: UFL form, or (UFL expression, points)}.
+        folder: folder of the cache.
+        jit_options: options of DOLFINx for the C compiler.
+        form_options: options of FFCx.
+    """
     code = "\n".join(ffcx.compiler.compile_ufl_objects([item], prefix=name, options=form_options)[1]
                      for name, item in items.items())
     files = [folder / f"{name}.so" for name in items]

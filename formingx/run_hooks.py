@@ -67,7 +67,7 @@ class MeshAdaptation(Protocol):
 
 
 def check_argument(caller: str, argument: str, given: Any, what: str) -> None:
-    """Check that an argument of a run is an extension for this argument.
+    """Check the argument `remesh` or `stop_at` of a run: it must be a `RunExtension` for this argument.
 
     Args:
         caller: name of the calling function, for messages.
@@ -76,7 +76,7 @@ def check_argument(caller: str, argument: str, given: Any, what: str) -> None:
         what: description of the required extension, for the error message.
 
     Raises:
-        InputError: the value is no extension, or an extension for the other argument.
+        InputError: the value is no `RunExtension`, or one for the other argument.
     """
     if not isinstance(given, RunExtension) or given.argument != argument:
         raise InputError(f"{caller}: {argument} = {given!r}: must be {what}")

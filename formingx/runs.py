@@ -51,18 +51,18 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         max_steps: largest number of accepted states. Default: the run ends when it no longer approaches its target.
         progress: show a progress bar on runs of more than two seconds (rank 0).
         start: path of this scene to be continued, for example from `formingx.load`; it is not changed. Without `step`
-            the run begins with the last step length of this path. Targets that the path has met count as met. If
-            another target lies before the last state of this path, the run follows the path backwards. Only a target
-            pressure is always approached forwards, because the pressure may reach it again.
+            the run begins with the last step length of this path. Targets that the path has met count as met. If its
+            last state is already beyond a target, the run goes back along the path to it. A target pressure is an
+            exception: the run goes on, because the pressure may reach the target again.
         checkpoint: folder to which every accepted state is written (`formingx.load`).
         record: {name: quantity} of additional columns. A quantity is a function of the `Problem` that returns a number,
             or a target such as `displacement(0, at=(1, 0))`, whose quantity is recorded.
         at_limit_point: action at a limit point of the control. "continue": follow the path beyond it, with a decreasing
             control. In contact or with history variables the path may end; then the body snaps through. "snap_through":
-            increase the control, and jump to the next equilibrium (`Path.jumps`). "stop": end the run. Default:
-            "snap_through" for time and, with history variables such as friction, for all controls except a growing
-            pressure; otherwise "continue". In contact or with history variables, a growing pressure continues while the
-            enclosed volume grows, as with an air supply.
+            increase the control, and jump to the next equilibrium (`Path.jumps`). "stop": end the run. The default
+            depends on the control. Time: "snap_through". A pressure on a body in contact or with history variables,
+            such as friction: "snap_through" if it decreases. If it grows, the run continues while the enclosed volume
+            grows, as with an air supply. Other cases: "snap_through" with history variables, "continue" without.
         resume: continue from the states in the checkpoint, which must be of this scene; begin if there are none.
         allow_inadmissible: continue, with a warning, through states that no body can have: self-penetrated, inside a
             tool, with inverted elements. `State.inadmissible_reason` gives the reason. By default the run ends there.

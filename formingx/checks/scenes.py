@@ -131,8 +131,9 @@ def _n_owned(scene: Scene, facets: np.ndarray) -> int:
 def _contact_penalties(body: Body) -> Iterator[Finding]:
     """Report contact penalties that are so small that faces penetrate, or so large that round-off grows.
 
-    The penetration over the thickness is about the traction over penalty x shear modulus. A width of the contact ramp
-    above 0.05 times the thickness is reported, too.
+    The penetration, divided by the thickness, is about p / (k mu), with the traction p, the shear modulus mu and the
+    dimensionless penalty k of the `Contact`. A width of the contact ramp above 0.05 times the thickness is reported,
+    too.
     """
     stress = max(body.moduli.values())
     pressed = body.scene.driven is not None and body.scene.driven.quantity == "pressure"

@@ -284,7 +284,11 @@ def _blow_ratio(body: Body) -> Found:
 
 @register("scene")
 def _open_moulds(body: Body) -> Found:
-    """Report an open mould: a part of the sheet meets no tool there, and bears only the pressure of a free sheet."""
+    """Report a mould without a surface straight ahead of a part of the sheet, if the sheet would be blown past its end.
+
+    This is so if a pressure of the run is larger than a free sheet bears, or if the mould is deep and no target ends
+    the run.
+    """
     for face in body.pressurised_faces:
         if not face.tools:
             continue

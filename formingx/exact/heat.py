@@ -212,7 +212,16 @@ def method_of_lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable],
 
 def _finite_volumes(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int,
                     source: Callable | None) -> np.ndarray:
-    """Return the temperatures at the nodes, shape (times, cells + 1); arguments as in `method_of_lines`."""
+    """Return the temperatures at the nodes of a slab at k times, by finite volumes, shape (k, cells + 1).
+
+    Args:
+        slab: the slab.
+        start: uniform initial temperature.
+        fluxes: heat fluxes into both faces, power/length^2, two functions of the temperature of the face.
+        times: times in ascending order, shape (k,).
+        cells: number of intervals between nodes.
+        source: heat source per volume, power/length^3, as a function of position; None: no source.
+    """
     from scipy.integrate import solve_ivp
     from scipy.sparse import diags
     n, dx = cells + 1, slab.thickness / cells

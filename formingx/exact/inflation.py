@@ -137,7 +137,7 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
 
 def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10: Callable[[float], float],
                       c01: float) -> MembraneState:
-    r"""Return the inflated membrane whose constant c10 is a function of R (arguments as in `membrane_inflation`).
+    r"""Return the inflated membrane whose constant c10 is a function of R, see `membrane_inflation`.
 
     .. math:: R N_1 \sin\theta = \frac{p r^2}{2}, \qquad \frac{d(R N_1 \cos\theta)}{dR} = N_2 - p r \lambda_1 \sin\theta
 

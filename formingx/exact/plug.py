@@ -295,16 +295,17 @@ def _integrate(length: float, y: np.ndarray, derivatives: Callable, **options: A
 
 
 def _contact_derivatives(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
-    """Return a function of (R, r, z, phi, T1) that gives their derivatives by arc length in the zone of contact.
+    """Return a function of (R, r, z, phi, T1) that gives the derivatives of the five by arc length, in this order.
 
-    R and r are the reference and deformed radius, z is the height, phi the slope, T1 the meridional tension. Lengths
-    are over the reference radius of the membrane, tensions over 2 c10 h0. The equations are stated in
-    `membrane_sliding_over_plug`.
+    It holds where the membrane touches the rounded edge or the vertical side of the plug. R and r are the reference and
+    deformed radius, z is the height, phi the slope of the meridian, T1 the meridional tension. Lengths are over the
+    reference radius of the membrane, tensions over 2 c10 times the reference thickness.
+    `membrane_sliding_over_plug` states the equations.
 
     Args:
         mu: coefficient of friction.
-        h0: reference thickness; 0 on the side of the plug.
-        fillet: radius of the edge; infinite on the side of the plug.
+        h0: reference thickness of the membrane over its reference radius; 0 on the vertical side.
+        fillet: radius of the edge over the reference radius of the membrane; infinite on the vertical side.
     """
     def derivatives(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)

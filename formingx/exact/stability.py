@@ -197,13 +197,13 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
 
 
 def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) -> float:
-    r"""Return the determinant that vanishes where a tube under pressure bifurcates, at an axial stretch of 1.
+    r"""Return the determinant that vanishes where a neo-Hookean tube under pressure bifurcates; the axial stretch is 1.
 
     .. math:: v_r = U \cos n\theta \cos k z, \; v_\theta = V \sin n\theta \cos k z, \; v_z = W \cos n\theta \sin k z
 
-    Three motions v with amplitudes U, V, W, functions of r, satisfy incremental equilibrium. They also satisfy
-    the boundary conditions on the inner face. The columns of the determinant are their errors in the three boundary
-    conditions on the outer face.
+    Three motions v with amplitudes U, V, W, functions of r, satisfy incremental equilibrium and the boundary conditions
+    on the inner face. Each motion has three errors in the boundary conditions on the outer face, along r, theta and z.
+    The determinant is that of these errors: a row for each condition, a column for each motion.
 
     Args:
         ratio: inner over outer reference radius.

@@ -44,7 +44,10 @@ _TOLERANCES = {"rtol": 1e-12, "atol": 1e-13}
 class Body:
     r"""Viscoelastic body with one degree of freedom s, and its present state; initially s = 0 and the stress is 0.
 
-    The load is a sum over n points. T is the difference of the Cauchy stresses in the principal directions 1 and 3:
+    For a block and a thin balloon s is the logarithm of the stretch. For a thick wall s is a^n - A^n, with the deformed
+    and the reference inner radius a and A, and n = 2 for a tube, 3 for a sphere. The load is a sum over points. T is
+    the difference of the Cauchy stresses in the principal directions 1 (along a block, along a wall) and 3 (stress-free
+    in a block, through a wall):
 
     .. math:: \text{load} = \sum_{i=1}^n c_i(s) \, T_i, \qquad
               T = 2 c_{10} (\lambda_1^2 - \lambda_3^2) + \sum_k \mu_k \left(e^{2 w_{k1}} - e^{2 w_{k3}}\right)
@@ -83,11 +86,20 @@ class Body:
 
     @property
     def load(self) -> float:
-        """Load of the body in its present state, stress: nominal stress of a block, or p, or p R0/H0 of a balloon."""
+        """Load of the body in its present state, stress.
+
+        For a block it is the nominal stress, for a thick wall the inner pressure. For a thin balloon it is the inner
+        pressure times reference radius over reference thickness.
+        """
         return self._load(self.s, self.w)
 
     def jump(self, s: float) -> None:
-        """Deform the body instantaneously to the degree of freedom s, without relaxation."""
+        """Deform the body instantaneously, without relaxation.
+
+        Args:
+            s: new value of the degree of freedom: the logarithm of the stretch of a block or a balloon, or a^n - A^n of
+                a wall (`Body`).
+        """
         self.w = self._after_jump(s)
         self.s = s
 
@@ -95,8 +107,8 @@ class Body:
         """Deform the body instantaneously, without relaxation, until it carries a given load.
 
         Args:
-            load: the load, stress.
-            bracket: two values of the degree of freedom s, between which the load is reached.
+            load: the load, stress, such as the inner pressure of a wall (`load`).
+            bracket: two values of the degree of freedom s (`Body`), between which the load is reached.
         """
         from scipy.optimize import brentq
         self.jump(brentq(lambda s: self._load(s, self._after_jump(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
@@ -123,7 +135,15 @@ class Body:
         return self.deform(lambda t: (s, 0.0), times)
 
     def creep(self, times: Any) -> np.ndarray:
-        """Return the degree of freedom s at ascending times, shape (n,), while the load is constant (creep)."""
+        """Return the degree of freedom s during creep, while the present load stays constant.
+
+        Args:
+            times: ascending times, shape (n,).
+
+        Returns:
+            Values of s, shape (n,): the logarithm of the stretch of a block or a balloon, or a^n - A^n of a wall
+            (`Body`).
+        """
         def rate(t, y):
             s, w = y[0], y[1:].reshape(self.w.shape)
             ds = 1 / self._time_per_s(s, w)
@@ -136,10 +156,12 @@ class Body:
     def creep_times(self, targets: Any, end: float) -> tuple[np.ndarray, float | None]:
         """Return the times at which the degree of freedom s reaches given values in creep under the present load.
 
-        At no s up to `end` may the relaxed body be in equilibrium under this load, because creep would stop there.
+        The load must be larger than the load of the completely relaxed body at every s up to `end`. Otherwise creep
+        would approach an equilibrium and stop.
 
         Args:
-            targets: values of s, shape (n,).
+            targets: values of s, shape (n,): logarithms of the stretch of a block or a balloon, or a^n - A^n of a wall
+                (`Body`).
             end: value of s at which the integration ends.
 
         Returns:
@@ -163,13 +185,15 @@ class Body:
         return np.array(times), float(found.y_events[0][0][0]) if len(found.t_events[0]) else None
 
     def _load(self, s: float, w: np.ndarray) -> float:
-        """Return the load for the degree of freedom s and the elastic strains w."""
+        """Return the load, stress, for the degree of freedom s and the elastic strains w, shape (n, branches, 3)."""
         return float(self.weight(s)[0] @ self._difference(s, w))
 
     def _difference(self, s: float, w: np.ndarray) -> np.ndarray:
-        """Return the differences T of the Cauchy stresses in directions 1 and 3 at all points, shape (n,), stress.
+        """Return the differences T of two principal Cauchy stresses at all points, shape (n,), stress.
 
-        s: degree of freedom; w: elastic strains, shape (n, branches, 3).
+        In a wall they are the circumferential minus the radial stress, in a block the stress along the load minus the
+        stress in the stress-free direction. The degree of freedom is s, and w are the elastic strains of the branches,
+        shape (n, branches, 3).
         """
         l2 = np.exp(2 * self.strain(s)[0][:, None] * self.direction)
         m = np.exp(2 * w)
@@ -184,7 +208,13 @@ class Body:
         return np.broadcast_to(self.strain(s)[1][:, None, None] * self.direction, self.w.shape).ravel()
 
     def _elastic_rate(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:
-        """Return the time derivatives of the elastic strains w for the rate ds of s, shape (3 n branches,), 1/time."""
+        """Return the time derivatives of the elastic strains w, as one array, shape (3 n branches,), 1/time.
+
+        Args:
+            s: degree of freedom.
+            ds: rate of the degree of freedom.
+            w: elastic strains at the n points, shape (n, branches, 3); the result has their order.
+        """
         return self._strain_rate(s) * ds - self._relaxation_rate(w).ravel()
 
     def _relaxation_rate(self, w: np.ndarray) -> np.ndarray:
@@ -201,7 +231,13 @@ class Body:
         .. math:: \frac{dt}{ds} = \frac{\sum (c' T + c \, e' \, \partial T / \partial e)}
                   {\sum c \sum_k 2 \mu_k (e^{2 w_{k1}} \rho_{k1} - e^{2 w_{k3}} \rho_{k3})}
 
-        Here :math:`\rho` are the results of `_relaxation_rate`; sums without limits are over the points.
+        Sums without limits are over the n points. There c(s) is the weight of the load, e(s) the strain of the body and
+        T the stress difference; a prime is a derivative by s. Sums over k are over the branches, with the shear moduli
+        mu_k and the elastic strains w. The rates at which these decrease by relaxation are rho.
+
+        Args:
+            s: degree of freedom.
+            w: elastic strains, shape (n, branches, 3).
         """
         (e, de), (c, dc), d = self.strain(s), self.weight(s), self.direction
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
@@ -231,11 +267,12 @@ class Body:
 
 
 def block(mode: str, *, c10: float, branches: Any) -> Body:
-    r"""Return a block in a homogeneous test, with s = ln(lambda) and the nominal stress P as load.
+    r"""Return a block in a homogeneous test as a `Body`, whose load is the nominal stress P.
 
     .. math:: P = T / \lambda
 
-    T is the difference of the Cauchy stresses along the load and in the stress-free direction (`Body`).
+    T is the difference of the Cauchy stresses along the load and in the stress-free direction. The degree of freedom is
+    s = ln(lambda), with the stretch lambda along the load.
 
     Args:
         mode: "uniaxial", "pure_shear" or "equibiaxial".
@@ -249,12 +286,14 @@ def block(mode: str, *, c10: float, branches: Any) -> Body:
 
 
 def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, branches: Any, points: int = 40) -> Body:
-    r"""Return a thick tube (plane strain) or sphere, with s = a^n - A^n and the inner pressure p as load.
+    r"""Return a thick tube (plane strain) or sphere as a `Body`, whose load is the inner pressure p.
 
-    Here a is the deformed inner radius, and n is 2 for a tube and 3 for a sphere. T is the difference of hoop and
-    radial Cauchy stress (`Body`):
+    Its degree of freedom s is given by the deformed and the reference inner radius a and A. T is the difference of
+    circumferential and radial Cauchy stress at the reference radius R, whose deformed radius is r:
 
-    .. math:: r^n = R^n + s, \qquad p = \int_A^B \frac{(n - 1) \, T \, R^{n-1}}{r^n} \, dR
+    .. math:: s = a^n - A^n, \qquad r^n = R^n + s, \qquad p = \int_A^B \frac{(n - 1) \, T \, R^{n-1}}{r^n} \, dR
+
+    Here n is 2 for a tube and 3 for a sphere.
 
     Args:
         kind: "tube" or "sphere".
@@ -281,12 +320,12 @@ def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, bra
 
 
 def balloon(*, c10: float, branches: Any) -> Body:
-    r"""Return a thin spherical balloon under a pressure p, with s = ln(lambda) and the load p R0/H0.
+    r"""Return a thin spherical balloon under the inner pressure p as a `Body`, whose load is p R0/H0.
 
     .. math:: \frac{p R_0}{H_0} = \frac{2 T}{\lambda^3}, \qquad \lambda = \frac{r}{R_0}
 
     r and R0 are the deformed and the reference radius, H0 is the reference thickness. T is the difference of the Cauchy
-    stresses along and through the wall (`Body`).
+    stresses along and through the wall. The degree of freedom is s = ln(lambda).
 
     Args:
         c10: neo-Hookean constant of the equilibrium, stress.

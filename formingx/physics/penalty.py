@@ -305,6 +305,11 @@ class Law(NormalLaw):
         """Return the elastic slip g that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
 
         The result is stored for repeated calls with the same arguments.
+
+        Args:
+            x: positions relative to the tool, shape (n, 2), length.
+            near: geometry of the tool there, the result of `nearest`.
+            old: history variables of the last accepted state.
         """
         if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
             g, dg = np.empty(len(x)), np.empty((len(x), 2))

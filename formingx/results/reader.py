@@ -32,7 +32,10 @@ class Reader(Protocol):
         """Return the key numbers of the part in a state; for the arguments see `Path.part`."""
 
     def filling(self, contact: FaceContact) -> ColumnTable:
-        """Return the remaining gaps between the body and the tool of a contact in every state, as a table."""
+        """Return the remaining gaps between the body and the tool of a contact as a table, one row per state.
+
+        In a section the columns are the controls, such as the pressure, and the gap in each corner of the tool.
+        """
 
     def view(self, file: object, state: State, grid: float | None) -> None:
         """Draw the body in a state as a PNG file; for the arguments see `Path.view3d`."""

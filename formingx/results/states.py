@@ -282,9 +282,10 @@ class States:
         return found
 
     def _run_to(self, segment: Segment, left: State, right: State, target: Target, bound: Quantity) -> State:
-        """Return the state that meets a target, from a run that starts at the first of two successive states.
+        """Return the state between two successive states that meets a target, by a run from the first of them, `left`.
 
-        So it has the history variables of a run. For arguments and errors see `_between`.
+        The steps of this run update the history variables. `right` is the second state, `segment` contains both, and
+        `bound` is the quantity of the target, bound to the problem of the segment. Errors are those of `_between`.
         """
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that controls an output"
@@ -360,7 +361,8 @@ class States:
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
         """Return the values of columns on a smooth curve through successive states of one stage (`curve`).
 
-        There is one row per point, with one value per column. The point of the first state is left out.
+        There is one row per point, with one value per column; the first state has none. `columns` are their names,
+        `points` is the number of points from one state to the next, and `segment` contains the states.
         """
         from scipy.interpolate import PchipInterpolator
         known_columns = self._view(segment).columns

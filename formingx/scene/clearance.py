@@ -35,7 +35,7 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
         if not all(map(np.isfinite, travels.values())):
             unknown.append(plan)
         present = {i: tool for i, tool in tools.items() if i not in plan.inactive}
-        for ends in _piece_ends(plan, travels):
+        for ends in _break_points(plan, travels):
             for i in (i for i in present if ends[i] != travels[i] and np.isfinite(ends[i])):
                 try:
                     scene.check_travel(tools[i], ends[i])
@@ -48,10 +48,15 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
     return unknown
 
 
-def _piece_ends(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, float]]:
-    """Yield the travels of all tools, {number in `Scene.items`: length}, at the ends of the linear pieces of a stage.
+def _break_points(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, float]]:
+    """Yield the travels of all tools, {number in `Scene.items`: length}, at the break points of a stage.
 
-    `travels` are the travels at the beginning of the stage. A travel that the stage determines only in the run is nan.
+    These are the points of its tables over time, between which travels are linear, or else the end of the stage. A
+    travel that is known only in the run is nan.
+
+    Args:
+        plan: the stage, as a `Plan` (`formingx.solve.stage`).
+        travels: travels at the beginning of the stage.
     """
     if plan.tables:
         for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):

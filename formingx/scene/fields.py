@@ -48,7 +48,14 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 
 
 def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
-    """Return the result of `values_at` for points that are equal on all ranks; `axes` is "RZ" or "xy"."""
+    """Return the values of a temperature at points that are equal on all ranks, shape (n,); collective.
+
+    Args:
+        field: the temperature, in one of the forms of `values_at`.
+        points: reference positions, shape (n, 2), length.
+        name: name of the argument, for messages.
+        axes: names of the coordinates, "RZ" or "xy".
+    """
     if isinstance(field, type):
         raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}, not a class")
     if isinstance(field, Table):

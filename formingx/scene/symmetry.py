@@ -87,8 +87,9 @@ class MirrorPlanes:
         r"""Return the ratio of the force on a whole tool or support to the force on its part in the model.
 
         The ratio is :math:`2^m` with the number m of planes that count. A plane counts if the tool or the boundary of
-        the support reaches it, because it then continues on the other side. It does not count if the force has a
-        component across it. The images of this component cancel, so the force on one side is used.
+        the support reaches it, because it then continues on the other side. It does not count if the direction
+        has a component normal to the plane. The forces on both sides are then opposite and would cancel, so the force
+        on one side is returned.
 
         Args:
             extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components),

@@ -133,10 +133,13 @@ def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
 
 
 def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
-    """Return the volume between a body and its mould, and a bound of the true volume over this approximate one.
+    """Return the volume between a body and its mould, by counting the squares of a grid over the section.
 
-    The volume has the unit length^3, or length^2 in plane strain; it is infinite if the mould is open. For a flat body
-    squares outside the tool are counted, if they are connected with the body in the reference configuration.
+    For a flat body a square counts if its centre is outside the tool and in the cavity next to the body.
+
+    Returns:
+        The volume, length^3, or length^2 in plane strain; infinite if the mould is open. Then the largest ratio of the
+        true volume to this volume.
     """
     from scipy.ndimage import binary_dilation, label
     face = scene.mesh.nodes_of(contact.on)

@@ -57,11 +57,16 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 
 
 def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
-    """Raise an InputError if a tool would be deep in the undeformed face before it meets a contact point.
+    """Raise an InputError if a tool would cut deeply into the undeformed face before it meets a contact point.
 
-    The tool moves repeatedly by its distance from the nearest contact point (sphere tracing), so it passes no point. A
-    fixed tool is assumed to approach the nearest middle of an edge along its normal. `ends` are the end points of the
-    element edges of the face, shape (n, 2, 2), length, and `thickness` is the thickness of the body, length.
+    Deeply means more than a tenth (`CUT`) of the thickness. The tool moves repeatedly by its distance from the nearest
+    contact point (sphere tracing), so it passes no point. The path of a tool without a direction is not known. It is
+    assumed to be straight, along the normal of the tool at the nearest edge of the face.
+
+    Args:
+        contact: the contact of the face with the tool.
+        ends: end points of the n element edges of the face, shape (n, 2, 2), length.
+        thickness: thickness of the body, length.
     """
     tool = contact.tool
     near = tool.nearest(ends.mean(1))

@@ -87,7 +87,7 @@ def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
 
 def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the lines and arcs of a curve by the function for its kind (arguments as in `_pieces`).
+    """Return the lines and arcs of a DXF entity by the function for its kind, with the arguments of `_pieces`.
 
     Raises:
         InputError: the kind is not supported, or the curve lies in another plane.
@@ -102,23 +102,26 @@ def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
 
 
 def _line(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the line of a DXF entity LINE, as a list; arguments as in `_pieces`."""
+    """Return the line of a DXF entity LINE, as a list; `name` begins error messages, `tolerance` is not used."""
     return [Line(_in_plane(entity.dxf.start, name), _in_plane(entity.dxf.end, name))]
 
 
 def _arc(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the arc of a DXF entity ARC, as a list; arguments as in `_pieces`."""
+    """Return the arc of a DXF entity ARC, as a list; `name` begins error messages, `tolerance` is not used."""
     start, end = math.radians(entity.dxf.start_angle), math.radians(entity.dxf.end_angle)
     return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), start, (end - start) % TURN or TURN)]
 
 
 def _circle(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the arc of 360 degrees of a DXF entity CIRCLE, as a list; arguments as in `_pieces`."""
+    """Return the arc of 360 degrees of a DXF entity CIRCLE, as a list.
+
+    `name` begins error messages, `tolerance` is not used.
+    """
     return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), 0.0, TURN)]
 
 
 def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the lines and arcs of a DXF polyline; arguments as in `_pieces`.
+    """Return the lines and arcs of a DXF polyline; `name` begins error messages, `tolerance` is not used.
 
     Each point has a bulge: the tangent of a quarter of the angle of the arc that follows, negative if clockwise.
 
@@ -151,10 +154,10 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
 
 
 def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along a DXF ellipse, within the tolerance; arguments as in `_pieces`.
+    """Return arcs along a DXF ellipse; their largest distance from it is `tolerance`, length.
 
     Raises:
-        InputError: the ratio of the axes is not between 0 and 1, or there is no tolerance.
+        InputError: the ratio of the axes is not between 0 and 1, or `tolerance` is None; `name` begins the message.
     """
     _in_plane(entity.dxf.center, name), _in_plane(entity.dxf.major_axis, name)
     if not 0 < entity.dxf.ratio <= 1:
@@ -170,7 +173,13 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
 
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along the smooth parts of a DXF spline between its knots; arguments as in `_pieces`."""
+    """Return arcs along the smooth parts of a DXF spline between its knots.
+
+    Their largest distance from the spline is `tolerance`, length.
+
+    Raises:
+        InputError: `tolerance` is None, or a point is outside the plane. The message begins with `name`.
+    """
     for point in (*entity.control_points, *entity.fit_points):
         _in_plane(point, name)
     tool = entity.construction_tool()

@@ -30,8 +30,8 @@ class AdmissibilityLimits:
             whichever is larger.
         penetration: largest penetration of a contact point, over the deformed wall there. Beyond it the body did not
             follow the tool. Williams' plug on coarse elements reaches 0.051.
-        largest_energy_ratio: upper bound of the estimated relative error of a tool force, over the fraction of the
-            strain energy that penetration stores. It matters for a body that is pressed flat.
+        largest_energy_ratio: bound of the estimated relative error of a tool force: it is at most this number times the
+            fraction of the strain energy that penetration stores. It matters for a body that is pressed flat.
     """
 
     volume: float = 0.25
@@ -53,7 +53,7 @@ class Depth(NamedTuple):
         depth: distance of the point inside the tool from the tool's surface, positive, length.
         place: deformed position of the point, shape (2,) or (3,), length.
         contact: the `FaceContact` with the tool.
-        name: name of the tool, or of the face that touches it.
+        name: name of the `Contact` with the tool, or of its boundary if it has no name.
     """
 
     ratio: float
@@ -72,7 +72,8 @@ class Depth(NamedTuple):
 class AdmissibilityCheck:
     """Check of the states of one problem; an inadmissible state satisfies the equations, but no real body can have it.
 
-    Examples are states with inverted elements, with a face inside a tool, or with tool forces that penetration changes.
+    Examples are states with inverted elements, with a face inside a tool, or with wrong tool forces, because contact
+    points penetrate the tool too far.
 
     Args:
         problem: the discretised problem.
@@ -101,7 +102,9 @@ class AdmissibilityCheck:
             state: the state.
 
         Returns:
-            The findings; empty if no penetration exceeds its limit. In three dimensions they are "serious".
+            The findings; empty if all penetrations are small. In a section a finding is a warning: penetration changes
+            a tool force by more than `Limits.warning_error`, or a face is too deep in a tool. In three dimensions it is
+            "serious": a contact point is too deep. Allowed is a tenth of the thickness (`CUT`).
         """
         if not self._solid:
             deepest = self._deepest_points(state, lambda contact: CUT * contact.thickness)
@@ -116,7 +119,7 @@ class AdmissibilityCheck:
                     name = contact.contact.label
                     found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
                                          f" about {100 * error:.2g} %: {_penalty_advice(contact, error)}."))
-            for cut in self._deepest(edges, lengths, state, own=True):
+            for cut in self._deepest(edges, lengths, state, on_face=True):
                 found.append(Finding("warning", cut.name, f"Between contact points the face is {cut.depth:.3g} deep in"
                                      f" the tool of {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}):"
                                      f" smaller elements there, or a larger fillet."))
@@ -145,7 +148,7 @@ class AdmissibilityCheck:
                        f" by a pilot run (trace(adapt_mesh=True), for a sheet over an edge)")
             edges = self._outline.edges()
             lengths = _lengths(edges)
-            for deep in self._deepest(edges, lengths, state, own=False):
+            for deep in self._deepest(edges, lengths, state, on_face=False):
                 yield (f"the body is {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
                        f" ({deep.place[0]:.5g}, {deep.place[1]:.5g}): a face without a Contact is there, or the"
                        f" elements are too large for the tool")
@@ -166,8 +169,8 @@ class AdmissibilityCheck:
         if place is not None:
             yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
 
-    def _deepest(self, edges: np.ndarray, lengths: np.ndarray, state: State, own: bool) -> Iterator[Depth]:
-        """Yield for each active tool in a section the deepest point of the boundary, if it is deeper than allowed.
+    def _deepest(self, edges: np.ndarray, lengths: np.ndarray, state: State, on_face: bool) -> Iterator[Depth]:
+        """Yield for each active tool of a section the deepest point of the boundary in it, if deeper than allowed.
 
         Edges are examined whose ends and middle are so deep that a point between them may be too deep: no point of an
         edge is farther from the nearest of the three than a quarter of the largest derivative of its parabola.
@@ -176,8 +179,8 @@ class AdmissibilityCheck:
             edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
             lengths: their lengths, shape (m,).
             state: the state.
-            own: True to examine the face of the contact alone, with the limit of a warning; False: the whole boundary,
-                with `AdmissibilityLimits.depth`.
+            on_face: True to examine only the face that touches the tool; a tenth of the thickness (`CUT`) is allowed.
+                False to examine the whole boundary; `AdmissibilityLimits.depth` is allowed.
         """
         a, b, middle = edges.transpose(1, 0, 2)
         slopes = np.linalg.norm([4 * middle - 3 * a - b, a - 4 * middle + 3 * b], axis=-1)
@@ -185,7 +188,7 @@ class AdmissibilityCheck:
             if not contact.present:
                 continue
             allowed = _LIMITS.depth * np.maximum(contact.thickness, lengths)
-            if own:
+            if on_face:
                 allowed = np.where(face, CUT * contact.thickness, np.inf)
             near = np.flatnonzero(_depths(contact, edges, state).max(1) + slopes.max(0) / 4 > allowed)
             if not len(near):
@@ -217,7 +220,9 @@ class AdmissibilityCheck:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
 
     def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
-        """Yield for each tool the contact point of largest penetration over the deformed wall, if above its limit.
+        """Yield for each tool the contact point with the largest ratio of penetration to deformed wall.
+
+        It is yielded only if the ratio exceeds `Limits.penetration`.
 
         Args:
             edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
@@ -252,7 +257,7 @@ def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
 def _allowed_penetration(contact: Any) -> np.ndarray:
     """Return the allowed penetration of the n points of a `FaceContact` in three dimensions, shape (n,), length.
 
-    It is infinite for points that first touched in the last step of a lagged contact: no force acts on them yet.
+    It is infinite for points that first touched in the last step: contact forces begin in the next step.
     """
     allowed = _LIMITS.depth * np.maximum(contact.thickness, contact.rule.lengths)
     return np.where(contact.area < contact.rule.area, np.inf, allowed)
@@ -261,13 +266,14 @@ def _allowed_penetration(contact: Any) -> np.ndarray:
 def _force_error(contact: Any, state: State, images: int) -> float:
     r"""Return the estimated relative error of the force F on a moving tool due to penetration; collective.
 
-    Penetration stores the energy E of the total strain energy W, so the tool is 2 E/F too far in the body. With its
-    travel t and the limit c = `AdmissibilityLimits.largest_energy_ratio`, the estimate is
+    Penetration stores the energy E, so the tool has moved 2 E/F too far. With its travel t, the strain energy W of the
+    body and c = `AdmissibilityLimits.largest_energy_ratio`, the estimate is
 
     .. math::
         \min\left(\frac{2 E}{F^2} \left|\frac{dF}{dt}\right|, \; c \, \frac{E}{W}\right)
 
-    E/W is returned if it is small, or if F or the change of t is 0; 0 is returned for a fixed tool.
+    E/W is returned if it is below a tenth of `Limits.warning_error`, or if F or the change of t is 0. For a fixed tool
+    0 is returned.
 
     Args:
         contact: the `FaceContact` with the tool.

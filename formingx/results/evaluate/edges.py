@@ -18,7 +18,7 @@ class Edge(NamedTuple):
 
     Attributes:
         turn: angle between the tool normals at the two points, degrees.
-        tool: name of the tool, or of the face that touches it.
+        tool: name of the `Contact` with the tool, or of its boundary if it has no name.
         point: deformed position (r, z) half-way between the two points, length.
     """
 
@@ -30,8 +30,9 @@ class Edge(NamedTuple):
 def coarsest(path: Any, state: Any) -> Edge | None:
     """Return the tool edge at which the tool normal turns most between two neighbouring contact points; collective.
 
-    Only tools from which the body may separate are examined, without stick. Neighbours follow each other by R, then Z.
-    Points with constrained displacements do not slide.
+    Contacts that stick or never separate are not examined. Neighbours are contact points that follow each other when
+    they are ordered by the reference coordinate R, then Z. At least one of them must slide; a point with constrained
+    displacements does not count as sliding.
 
     Args:
         path: the computed `Path`.

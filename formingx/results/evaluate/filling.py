@@ -46,7 +46,11 @@ class Filling(ColumnTable):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the table: {name: values, shape (n,)}: the controls, and "corner_1_gap", "corner_2_gap", ..."""
+        """Columns of the table of n states, {name: values, shape (n,)}.
+
+        They are the columns of `control`, such as the pressure, and "corner_1_gap", "corner_2_gap", ..., the largest
+        distance from each corner to the deformed face, length.
+        """
         return self.control | {f"corner_{k}_gap": gap for k, gap in enumerate(self.gaps.T, 1)}
 
     @property

@@ -21,7 +21,7 @@ class Resticking(NamedTuple):
     """Contact point that separated from its tool and stuck again furthest from its previous position.
 
     Attributes:
-        tool: name of the tool, or of the face that touches it.
+        tool: name of the `Contact` with the tool, or of its boundary if it has no name.
         points: number of points on this tool that separated and stuck again.
         shift: sum of the distances between successive sticking positions on the tool, over the tributary length of the
             point.
@@ -35,10 +35,11 @@ class Resticking(NamedTuple):
 
 
 def furthest(path: Any) -> Resticking | None:
-    """Return the contact point with the largest `Resticking.shift` of all tools; collective.
+    """Return the contact point that stuck again furthest from its previous sticking position, of all tools; collective.
 
-    A point that sticks again elsewhere changes the strain beside it by its shift. Whether a point separates may depend
-    on small changes of the forces. So the shift also estimates the error of the wall due to the step lengths.
+    This distance over the tributary length of the point (`Resticking.shift`) is the change of the strain beside the
+    point. Whether a point separates may depend on small changes of the forces. So the shift also estimates the error of
+    the wall due to the step lengths.
 
     Args:
         path: the computed `Path`. In a remeshed run only the states on the last mesh are examined.
@@ -63,11 +64,14 @@ def furthest(path: Any) -> Resticking | None:
 
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
-    """Return `Resticking.shift` of the n contact points that this rank owns, shape (n,), dimensionless.
+    """Return how far the n contact points that this rank owns stuck again from their previous sticking positions.
+
+    The result is the sum of the distances between successive sticking positions on the tool, over the tributary length
+    of the point, shape (n,), dimensionless.
 
     Args:
         contact: the `FaceContact`.
-        touches: `ContactHistory` of its points in successive states.
+        touches: `ContactHistory` of these points in successive states.
     """
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)

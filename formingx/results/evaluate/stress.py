@@ -149,7 +149,7 @@ class StressField:
         return StressError(*(gathered(comm, v[selected]) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
-        """Return `StressError.mean`, estimated, in the m cells that this rank owns, shape (m,), stress; collective."""
+        """Return the estimated root mean square error of the stress in the m owned cells, shape (m,); collective."""
         return self._fitted.error().mean
 
     def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
@@ -261,7 +261,7 @@ class Stresses:
             return self._projected()
 
     def _projected(self) -> np.ndarray:
-        """Return the nodal values of F and S (`project`) for the present unknowns of the problem; collective."""
+        """Return the result of `project` for the present unknowns, shape (nodes, layers, 9); collective."""
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
         b, x = self._b, self._x
@@ -432,14 +432,14 @@ def _cauchy(values: np.ndarray) -> np.ndarray:
     """Return the Cauchy stress at q points of each of m cells, shape (m, q, 3, 3), stress.
 
     Args:
-        values: the k nonzero entries of F (`BLOCK`), then of S (`_S`), shape (m, q, k).
+        values: the nonzero entries of F (`BLOCK`), then of S (`_S`), in the order of `project`, shape (m, q, 9).
     """
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
-    """Return the `Stress` at reference positions, shape (n, 2); values: entries as in `_cauchy`, shape (n, k)."""
+    """Return the `Stress` at reference positions, shape (n, 2); values: entries of `project`, shape (n, 9)."""
     F, S = np.zeros((2, len(points), 3, 3))
     for k, (i, j) in enumerate(BLOCK):
         F[:, i, j] = values[:, k]

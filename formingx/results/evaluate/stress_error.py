@@ -52,18 +52,19 @@ class StressError(NamedTuple):
 
 
 class StressPeak(NamedTuple):
-    """Largest principal Cauchy stress of a state, and the largest one that the estimated errors allow in any cell.
+    """Largest principal Cauchy stress of a state, and the cell whose stress may be larger within its estimated error.
 
-    The error of a cell is the largest |sigma* - sigma_h| at its quadrature points. |.| is the Frobenius norm, sigma_h
-    the computed and sigma* the fitted Cauchy stress.
+    The fitted stress sigma* is smoother than the computed stress sigma_h. The error of a cell is the largest Frobenius
+    norm |sigma* - sigma_h| at its quadrature points. The stress of a cell is its largest principal stress, from sigma*
+    at its corners. The doubtful cell has the largest sum of stress and error.
 
     Attributes:
-        value: largest fitted principal stress at a corner of a cell, stress.
-        point: reference position (R, Z) of this corner, shape (2,), length.
+        value: largest stress of all cells, stress.
+        point: reference position (R, Z) of the corner with this stress, shape (2,), length.
         error: largest error of the cells that have this corner, stress.
-        doubtful: largest principal stress of the cell in which the sum of this stress and the error is largest, stress.
-        doubtful_point: reference position (R, Z) of the corner at which `doubtful` occurs, shape (2,), length.
-        doubtful_error: error of the cell of `doubtful`, stress.
+        doubtful: stress of the doubtful cell, stress.
+        doubtful_point: reference position (R, Z) of the corner with this stress, shape (2,), length.
+        doubtful_error: error of the doubtful cell, stress.
     """
 
     value: float

@@ -76,7 +76,8 @@ class EnergyBalance:
 
         Returns:
             {entry: energy added from the previous state to each state, shape (states,)}, stress length^3; in plane
-            strain stress length^2. The first value is 0.
+            strain stress length^2. Entries of loads, supports and tools are their work on the body. "friction", "jumps"
+            and "bonds" are positive losses. `Path.work` lists the others. The first value is 0.
         """
         pairs = list(zip(self._states, self._states[1:]))
         found = [self._step_energies(a, b) for a, b in pairs]
@@ -114,7 +115,7 @@ class EnergyBalance:
     def _middle(self, a: Any, b: Any) -> Any:
         """Return a state near the middle of the step from state a to state b, or None if none is found; collective.
 
-        It is solved for with the history variables of a, which are then advanced to it.
+        The solution uses the history variables of a. They are then updated for the new state.
         """
         problem, curve, h = self._problem, self._curve, self._curve.distance(a, b)
         if not h:

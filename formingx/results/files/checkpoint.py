@@ -294,7 +294,7 @@ def _read_state(data: dict, problem: Any) -> State:
 
 
 def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
-    """Return the unknowns of each cell on rank 0, in the order of the cells in the script's mesh; collective.
+    """Return the unknowns of each cell on rank 0, in the order in which the script gave the cells; collective.
 
     Args:
         space: function space of the unknowns.
@@ -317,7 +317,8 @@ def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
 
     Args:
         space: function space of the unknowns.
-        values: unknowns in the order of the cells in the script's mesh, shape (cells, unknowns per cell).
+        values: unknowns of all cells, shape (cells, unknowns per cell). The order is that in which the script gave the
+            cells to DOLFINx, which does not depend on the number of ranks.
     """
     numbers = space.mesh.topology.original_cell_index
     found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
@@ -329,8 +330,8 @@ def _tail(space: Any, owned: np.ndarray) -> list[float]:
     """Return the unknowns that belong to no cell, such as Lagrange multipliers, on all ranks; collective.
 
     Args:
-        space: function space of the other unknowns.
-        owned: unknowns that this rank owns; in the last rank, entries that belong to no cell follow.
+        space: function space of the unknowns that belong to cells.
+        owned: entries that this rank owns: its unknowns of `space`, then on the last rank those that belong to no cell.
     """
     return space.mesh.comm.allgather(owned[space.dofmap.index_map.size_local:].tolist())[-1]
 

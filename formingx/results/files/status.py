@@ -128,11 +128,12 @@ def target_column(stepping: dict[str, Any], measures: Container[str]) -> tuple[s
     A target such as `pressure(0.2)` of one of several loads becomes the column of this load, such as "air_pressure".
 
     Args:
-        stepping: data with which the run continues (`State.stepping`), among them its target.
+        stepping: data from which a run can be resumed (`State.stepping`), among them its target.
         measures: names of the columns.
 
     Returns:
-        (name of the column, value), or None without a target. The quantity may have no column.
+        (name of the column, value); None if the run has no target. If no column belongs to the target, the name is that
+        of the target.
     """
     if "until" not in stepping:
         return None

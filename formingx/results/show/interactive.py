@@ -77,7 +77,12 @@ def _run(record: ReportData, name: str, units: Units) -> dict[str, Any]:
 
 
 def _sheet(record: ReportData, units: Units) -> dict[str, Any]:
-    """Return the outline of a sheet and the fields on it in each drawn state, at no more than 101 points along it."""
+    """Return the data of a sheet for `report.js`, at no more than 101 stations along it and in the drawn states.
+
+    Entries are "from" and "material", name and reference coordinates of the stations, and "bottom" and "top", the faces
+    (r, z) in each drawn state (`ReportData.frames`). "fields" has {label: values in each drawn state}: wall, wall ratio and
+    all fields of the record, such as the stress.
+    """
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, FRAMES + 1)).round().astype(int))
     fields: dict[str, list] = {}
@@ -108,9 +113,11 @@ def _label(record: ReportData, units: Units, key: str) -> str:
 
 
 def _tools(record: ReportData) -> list[dict[str, Any]]:
-    """Return for each tool of a section its outline, an outline inside the tool, its direction, and its travels.
+    """Return the data of each tool of a section for `report.js`.
 
-    The travels belong to the drawn states; None while the tool is inactive.
+    Its "line" is the outline, its "shell" the outline moved inwards, to draw the tool with a thickness. "moves" is the
+    displacement per travel. "travel" has the travel in each drawn state (`ReportData.frames`), None while the tool is
+    inactive.
     """
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
@@ -128,7 +135,10 @@ def _tools(record: ReportData) -> list[dict[str, Any]]:
 
 
 def _loading(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any]]:
-    """Return charts of the loading curves of each stage: force of a tool over travel, or pressure over pole height."""
+    """Return charts (`_chart`) of loading curves: force of a tool over travel, or pressure over pole height.
+
+    A chart has one curve for each stage of each run. `names` are the names of the runs.
+    """
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
         for a, b in record.stage_ranges:
@@ -171,7 +181,10 @@ def _driven(record: ReportData, stage: slice) -> list[tuple[str, str, np.ndarray
 
 
 def _in_time(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return charts of pressures, travels, tool forces and temperatures of the body over the process time."""
+    """Return charts of pressures, travels, tool forces and temperatures of the body over the process time.
+
+    A chart is the result of `_chart`. `names` are the names of the runs.
+    """
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
         if not record.timed:
@@ -209,7 +222,8 @@ def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
 def _filling(records: list[ReportData], names: list[str], units: Units) -> dict[str, Any] | None:
     """Return a chart of the remaining gap in each corner of the fixed tools, or None without corners.
 
-    The gaps are drawn over the process time if all runs have one, or else over the pressure in the last stage.
+    The gaps are drawn over the process time if all runs have one, or else over the pressure in the last stage. `names`
+    are the names of the runs.
     """
     traces, timed = [], all(record.timed for record in records)
     for record, name in zip(records, names):
@@ -227,7 +241,8 @@ def _filling(records: list[ReportData], names: list[str], units: Units) -> dict[
 def _walls(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
     """Return two charts of the wall thickness in the last state: over the height, and over the arc length.
 
-    Both show the whole wall and, if there are several, each layer. A chart is None if no run has a profile.
+    Both show the whole wall and, if there are several, each layer. A chart is None if no run has a profile. `names` are
+    the names of the runs.
     """
     from ..evaluate.wall import Wall
     by_height, by_length = [], []

@@ -271,7 +271,14 @@ def _peaks(record: ReportData, units: Units) -> list[tuple[str, str]]:
 
 
 def _answers(records: list[ReportData], names: list[str], parts: list, units: Units) -> str:
-    """Return an HTML table of the key numbers of parts, forces and pressures, with one column per run."""
+    """Return an HTML table of the key numbers of parts, forces and pressures, with one column per run.
+
+    Args:
+        records: the runs.
+        names: names of the runs.
+        parts: key numbers of the part of each run (`KeyNumbers`), or None.
+        units: units for the labels.
+    """
     columns = [dict((found.rows if found is not None else []) + _peaks(record, units))
                for record, found in zip(records, parts)]
     rows = [[what, *(column.get(what, "") for column in columns)] for what in dict.fromkeys(
@@ -297,7 +304,10 @@ def _lead(record: ReportData, units: Units) -> str:
 
 
 def _key_numbers(record: ReportData, units: Units) -> str:
-    """Return an HTML table of all columns and the extreme walls, at limit points and in the last state."""
+    """Return an HTML table of all columns, and of the smallest and the largest wall over original thickness.
+
+    It has a column for each limit point and one for the last state.
+    """
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
     chosen.append(len(record.kinds) - 1)

@@ -312,7 +312,8 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
     """Return the temperature of a sheet in the states of a checkpoint.
 
     Args:
-        states: data of each state.
+        states: data of each state. The entry "memory" has the stored history variables; that of the temperature has
+            "points", reference positions, and "temperature", values there.
         last: profile of the sheet with m nodes, in the last state.
 
     Returns:
@@ -355,8 +356,9 @@ def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray
     In a run with process time, it is proportional to the time. In stages without time, a change of a control by its
     whole range counts as a quarter of the total time.
 
-    In a run without time, a step counts as its change of the controls, over their ranges, plus the mean displacement of
-    the middle line of the sheet, over the sum of all steps.
+    In a run without time, each step adds two relative changes. One is the change of a control divided by its range, as
+    a mean of all controls. The other is the mean displacement of the middle line of the sheet, divided by the sum of
+    these displacements in all steps. The sum of both, over all steps, is scaled to 1.
 
     Args:
         measures: {column: values, shape (n,)}.
@@ -385,9 +387,10 @@ def words(name: str) -> str:
 
 
 class _Fields:
-    """Computes stress, contact pressure and temperature of a sheet at the m nodes of its profile.
+    """Stress, contact pressure and temperature of a sheet, evaluated at the m nodes of its profile.
 
-    At each node it takes the larger one of the stresses at both faces, and the mean of their temperatures.
+    At each node the stress is the largest principal Cauchy stress, the larger one of its values at both faces. The
+    temperature is the mean of both faces.
 
     Args:
         path: the `Path`, with the states of one mesh.

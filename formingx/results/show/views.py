@@ -94,7 +94,16 @@ def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
-    """Draw the surface that a section sweeps out as a PNG on this rank; for the arguments see `_view`."""
+    """Draw the surface that a section sweeps out as a PNG on this rank.
+
+    Args:
+        profile: the `Profile` of the section.
+        stations: parameters of the m successive positions of the section, such as angles, shape (m,).
+        place: function of (points (r, z) of the section, shape (n, 2); parameter) that returns their coordinates x, y
+            and z, shape (n,) each.
+        camera: direction from the sheet to the camera, (x, y, z).
+        file: name of the picture.
+    """
     pyvista = figures.pyvista()
 
     def swept(line, values):
