@@ -30,7 +30,7 @@ def prepare_folder(folder: FilePath, task: Task, variables: list[str]) -> FilePa
         InputError: a folder of another study.
     """
     about = {"study": 1, "build": getattr(task.build, "__qualname__", ""), "variables": variables,
-             "measures": list(task.measure)}
+             "measures": list(task.measures)}
     file = folder / "study.json"
     if file.exists():
         stored = _json(file)

@@ -50,7 +50,7 @@ class Study(ColumnTable):
 
     def __init__(self, task: Task, variables: list[str], goal: dict[str, str], folder: FilePath | None):
         self._task, self._folder, self.variables, self.goal = task, folder, variables, goal
-        self.measures, self.runs = list(task.measure), list[StudyRun]()
+        self.measures, self.runs = list(task.measures), list[StudyRun]()
 
     @property
     def successful(self) -> list[StudyRun]:
@@ -243,7 +243,7 @@ class Study(ColumnTable):
 
 
 def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | Sequence[Mapping[str, float]],
-          measure: Mapping[str, Measure], *, goal: Mapping[str, str] | None = None, folder: Any = None,
+          measures: Mapping[str, Measure], *, goal: Mapping[str, str] | None = None, folder: Any = None,
           executor: futures.Executor | None = None, workers: int | None = None, progress: bool = True) -> Study:
     """Run the function `build` for many sets of values, and evaluate measures of each run.
 
@@ -253,7 +253,7 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         build: function of the variables, by name, that returns a path. Under an MPI executor it must make its mesh on
             `MPI.COMM_SELF`.
         variables: {name: values} for all combinations, or a list of {name: value}, one for each run.
-        measure: {name: function of the path that returns a number, or name of a column of the path}. Of a column the
+        measures: {name: function of the path that returns a number, or name of a column of the path}. Of a column the
             value in the last state counts.
         goal: {measure: "max" or "min"}; the first one defines the best run.
         folder: folder for the results of the runs. Runs stored there are not repeated.
@@ -279,9 +279,9 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     """
     from tqdm import tqdm
     cases = sets_of_values(variables)
-    task, goals = Task(build, _measures(build, measure)), dict(goal or {})
+    task, goals = Task(build, _measures(build, measures)), dict(goal or {})
     for name, direction in goals.items():
-        check_name("study: goal", name, task.measure)
+        check_name("study: goal", name, task.measures)
         check_name(f"study: goal of {name}:", direction, ("max", "min"))
     names = list(cases[0])
     folder = None if folder is None else stored_runs.prepare_folder(file_path("study: folder", folder), task, names)
@@ -299,15 +299,15 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
     return found
 
 
-def _measures(build: Any, measure: Any) -> dict[str, Measure]:
-    """Check the arguments `build` and `measure` of a study, and return `measure` as a new dict.
+def _measures(build: Any, measures: Any) -> dict[str, Measure]:
+    """Check the arguments `build` and `measures` of a study, and return `measures` as a new dict.
 
     Raises:
-        InputError: `build` is no function, or `measure` is no dict of functions and names of columns.
+        InputError: `build` is no function, or `measures` is no dict of functions and names of columns.
     """
     if not callable(build):
         raise InputError(f"study: build = {build!r}: must be a function of the variables that gives back a path")
-    if not isinstance(measure, Mapping) or not measure or not all(callable(m) or isinstance(m, str)
-                                                                  for m in measure.values()):
-        raise InputError(f"study: measure = {measure!r}: must be {{name: function of the path, or a column's name}}")
-    return dict(measure)
+    if not isinstance(measures, Mapping) or not measures or not all(callable(m) or isinstance(m, str)
+                                                                    for m in measures.values()):
+        raise InputError(f"study: measures = {measures!r}: must be {{name: function of the path, or a column's name}}")
+    return dict(measures)

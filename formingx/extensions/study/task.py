@@ -43,11 +43,11 @@ class Task(NamedTuple):
 
     Attributes:
         build: function of the variables that returns a path.
-        measure: {name: function of the path, or name of a column}.
+        measures: {name: function of the path, or name of a column}.
     """
 
     build: Callable[..., Any]
-    measure: dict[str, Measure]
+    measures: dict[str, Measure]
 
     def __call__(self, values: dict[str, float]) -> StudyRun:
         """Run `build` with values of the variables; return its measures, or the reason for its failure.
@@ -59,7 +59,7 @@ class Task(NamedTuple):
         try:
             result = self.build(**values)
             found = {name: float(result.last.measures[measure] if isinstance(measure, str) else measure(result))
-                     for name, measure in self.measure.items()}
+                     for name, measure in self.measures.items()}
             error = next((f"{name} is not a finite number" for name, v in found.items() if not math.isfinite(v)), "")
         except Exception as failure:                         # the other runs continue after any exception of the script
             found, error = {}, f"{type(failure).__name__}: {failure}"
