@@ -20,7 +20,7 @@ def plane(z: float = 0.0) -> Tool:
     Args:
         z: Z of the surface of the tool, length.
 
-    >>> fx.tools.plane(5.0).signed_distance([[0.0, 4.0], [0.0, 7.0]]).tolist()
+    >>> fx.tools.plane(5.0).signed_distance([[0.0, 4.0], [0.0, 7.0]]).tolist()          # below 0: outside
     [-1.0, 2.0]
     """
     z = finite("plane: z", z)
@@ -43,7 +43,7 @@ def cup(*, radius: float, depth: float, mouth: float = 0.0, draft: float = 0.0, 
         InputError: a length is not positive, an angle too large, or a fillet too large.
 
     >>> mould = fx.tools.cup(radius=30.0, depth=20.0, draft=5.0, fillet=3.0, lip=2.0)
-    >>> mould.signed_distance([[0.0, 19.0]]).round(6).tolist()
+    >>> mould.signed_distance([[0.0, 19.0]]).round(6).tolist()          # below 0: outside
     [-1.0]
     """
     radius, depth = positive("cup: radius", radius), positive("cup: depth", depth)
@@ -72,7 +72,7 @@ def male(*, radius: float, height: float, base: float = 0.0, draft: float = 0.0,
         InputError: a length is not positive, or an angle or a fillet is too large.
 
     >>> mould = fx.tools.male(radius=30.0, height=20.0, fillet=3.0)
-    >>> mould.signed_distance([[0.0, 25.0]]).tolist()
+    >>> mould.signed_distance([[0.0, 25.0]]).tolist()          # below 0: outside
     [-5.0]
     """
     radius, height = positive("male: radius", radius), positive("male: height", height)
@@ -115,7 +115,7 @@ def bottle(*, radius: float, height: float, neck: float, shoulder: float, neck_h
 
 
 def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
-    """Return a flat-ended plug that points down; signed distances are positive inside it.
+    """Return a flat-ended plug that points down.
 
     Args:
         radius: radius of the plug, length.
@@ -126,7 +126,7 @@ def cylinder(*, radius: float, z: float = 0.0, fillet: float = 0.0) -> Tool:
         InputError: the radius is not positive, or the fillet is too large.
 
     >>> plug = fx.tools.cylinder(radius=20.0, z=2.0, fillet=4.0)
-    >>> plug.signed_distance([[0.0, 0.0], [25.0, 30.0]]).tolist()
+    >>> plug.signed_distance([[0.0, 0.0], [25.0, 30.0]]).tolist()          # below 0: outside
     [-2.0, -5.0]
     """
     radius, z = positive("cylinder: radius", radius), finite("cylinder: z", z)
@@ -147,7 +147,7 @@ def cone(*, half_angle: float, z: float = 0.0, tip: float = 0.0, size: float = 1
         InputError: the angle is outside its range.
 
     >>> plug = fx.tools.cone(half_angle=30.0, z=1.0)
-    >>> plug.signed_distance([[0.0, 0.0]]).tolist()
+    >>> plug.signed_distance([[0.0, 0.0]]).tolist()          # below 0: outside
     [-1.0]
     """
     a = math.radians(positive("cone: half_angle", half_angle))
@@ -172,7 +172,7 @@ def sphere(*, radius: float, z: float = 0.0, r: float = 0.0) -> Tool:
     Raises:
         InputError: the radius is not positive.
 
-    >>> fx.tools.sphere(radius=10.0, z=5.0).signed_distance([[0.0, 4.0], [0.0, 6.0]]).tolist()
+    >>> fx.tools.sphere(radius=10.0, z=5.0).signed_distance([[0.0, 4.0], [0.0, 6.0]]).tolist()   # below 0: outside
     [-1.0, 1.0]
     """
     radius = positive("sphere: radius", radius)
@@ -210,7 +210,7 @@ def clamp_ring(*, radius: float, width: float, fillet: float, z: float = 0.0, he
         InputError: a length is not positive, or the fillets do not fit on the ring.
 
     >>> ring = fx.tools.clamp_ring(radius=50.0, width=20.0, fillet=2.0)
-    >>> ring.signed_distance([[60.0, -1.0]]).tolist()
+    >>> ring.signed_distance([[60.0, -1.0]]).tolist()          # below 0: outside
     [-1.0]
     """
     radius, z = positive("clamp_ring: radius", radius), finite("clamp_ring: z", z)
