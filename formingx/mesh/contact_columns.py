@@ -163,9 +163,10 @@ def _sharp_fillet(item: Any, fillet: FilletInSheet, wall: float, accuracy: str, 
 
 
 def is_thick_sheet(mesh: Mesh) -> bool:
-    """Return True for a sheet that is too thick for elements chosen by its tools, but no block.
+    """Return True for a sheet from `disc` or `parison` whose thickness is 1/10 to 1/4 of its length.
 
-    mesh: mesh from `disc` or `parison`.
+    The tools that it touches do not choose its elements (`for_contacts`). A thicker body is a block, whose wall is of
+    no interest.
     """
     if mesh.preset is None or mesh.columns is None:
         return False

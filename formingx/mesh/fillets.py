@@ -25,7 +25,7 @@ class FilletInSheet(NamedTuple):
         first, last: distances of the ends of this part from the start of the sheet, along the sheet, length.
         radius: radius of the fillet, length.
         turn: 1 - cos of the angle of the arc, at most 1.
-        stretch: reference over deformed length of the sheet on the fillet, along the section.
+        stretch: inverse stretch of the sheet on the fillet along the section, reference over deformed length.
         area_ratio: reference over deformed area there, which equals deformed over reference thickness.
         concave: True if the sheet bridges the fillet before it touches it.
     """
@@ -45,7 +45,7 @@ class FlatsInSheet(NamedTuple):
     Attributes:
         positions: lengths along the sheet from its start to the points, ascending, shape (n,), length.
         free_radii: radius of the free surface of the sheet when a point touches, shape (n,), length.
-        stretches: reference over deformed length of the sheet there, along the section, shape (n,).
+        stretches: inverse stretches of the sheet there along the section, reference over deformed length, shape (n,).
         area_ratios: reference over deformed area there, shape (n,).
     """
 
@@ -222,14 +222,15 @@ def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) ->
 def _positions(x: np.ndarray, free: np.ndarray, face: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Return the positions along the undeformed sheet of the material that touches a tool, shape (m,), length.
 
-    A point of the tool is touched when the radius of the free surface falls to its radius `free`. Each free part of the
-    sheet is an arc of this radius. It stretches evenly between the points at its ends, which stick.
+    The radius of the free surface decreases. A point of the tool is touched when this radius equals the radius of the
+    largest ball outside the tool that touches the tool there (`free`). Each free part of the sheet is an arc of the
+    present radius. It stretches evenly between the points at its ends, which stick.
 
     Args:
         x: points of the tool in order along the sheet, shape (m, 2), length.
         free: radius of the largest ball outside the tool that touches each point, shape (m,), length.
-        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
-        s: length along the face from its start to these points, shape (n,).
+        face: n points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
+        s: length along the face from its start to these n points, shape (n,), length.
     """
     points = np.concatenate([face[:1], x, face[-1:]])
     on_axis = [(end, neighbour) for end, neighbour in ((0, 1), (-1, -2)) if face[end, 0] <= 1e-9 * s[-1]]
