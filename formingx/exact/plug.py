@@ -281,7 +281,7 @@ def _state_after(length: float, y: np.ndarray, derivatives: Callable) -> np.ndar
     Lengths are over the reference radius of the membrane, tensions over 2 c10 h0 (h0: reference thickness).
 
     Args:
-        length: distance, arc length or reference radius as in `derivatives`.
+        length: distance, in the variable of `derivatives`: arc length or reference radius.
         y: state (reference radius, deformed radius, height, slope, meridional tension), shape (5,).
         derivatives: function of the five entries of a state that returns their derivatives by the distance.
     """

@@ -105,8 +105,8 @@ def read(file: str | os.PathLike) -> Grid:
     """Return the grid in a gmsh file; physical groups name the layers (dimension 2) and the boundaries (dimension 1).
 
     Raises:
-        InputError: as in `content`. There is no physical group of dimension 2, an element is not a triangle, or the
-            body is not in a plane of constant z.
+        InputError: the file is missing or damaged (`content`). There is no physical group of dimension 2, an element is
+            not a triangle, or the body is not in a plane of constant z.
     """
     file = os.fspath(file)
     found = content(file)

@@ -123,7 +123,7 @@ class Pressure(Load):
         gives the change of the cofactor.
 
         Args:
-            body: as in `Load.mode_work`.
+            body: object with the members of `Load.mode_work`, among them `mode`, `dmode` and `H`.
             value: pressure p (UFL scalar, stress).
 
         Returns:
@@ -208,7 +208,7 @@ class CentrifugalLoad(Load):
         .. math:: \int_{V} \rho \, \omega^2 (U \, \delta U + V \, \delta V) \, dV
 
         Args:
-            body: as in `Load.mode_work`.
+            body: object with the members of `Load.mode_work`, among them `mode`, `dmode` and `H`.
             value: omega^2 (UFL scalar, 1/time^2).
 
         Returns:

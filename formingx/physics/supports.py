@@ -37,7 +37,7 @@ class ConstrainedMean(NamedTuple):
     The weight w is 1 or the shear modulus of the layer. The multiplier is a traction in proportion to w.
 
     Attributes:
-        component: number i of the component, see `Constrained`.
+        component: number i of the component in `NAMES`: 0 for r, 1 for z, 2 for y, 3 for x.
         on: name of the boundary.
         by_stiffness: True if w is the shear modulus of the layer, False if w = 1.
         point: None; `Constrained` has the same attribute.
