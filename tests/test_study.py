@@ -159,7 +159,7 @@ def test_refining_finds_the_maximum_between_the_levels(here):
 
 def test_wrong_arguments_of_studies_are_refused():
     for given, message in ((({"x": [1]}, {"f": lambda path: 1.0}), "importable by name"), (({}, {"f": f}), "variables"),
-                           (({"x": ["a"]}, {"f": f}), "study: x = 'a'"), (({"x": [1]}, {}), "measure = {}")):
+                           (({"x": ["a"]}, {"f": f}), "study: x = 'a'"), (({"x": [1]}, {}), "measures = {}")):
         with pytest.raises(fx.InputError, match=message):
             fx.study(formula, *given, progress=False)
     with pytest.raises(fx.InputError, match="goal of f: 'big' is not known"):

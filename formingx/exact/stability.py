@@ -203,7 +203,7 @@ def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) ->
 
     Three motions v with amplitudes U, V, W, functions of r, satisfy incremental equilibrium and the boundary conditions
     on the inner face. Each motion has three errors in the boundary conditions on the outer face, along r, theta and z.
-    The determinant is that of these errors: a row for each condition, a column for each motion.
+    The errors form the determinant: a row for each condition, a column for each motion.
 
     Args:
         ratio: inner over outer reference radius.

@@ -317,8 +317,8 @@ def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
 
     Args:
         space: function space of the unknowns.
-        values: unknowns of all cells, shape (cells, unknowns per cell). The order is that in which the script gave the
-            cells to DOLFINx, which does not depend on the number of ranks.
+        values: unknowns of all cells, shape (cells, unknowns per cell). They have the order in which the script gave
+            the cells to DOLFINx, which does not depend on the number of ranks.
     """
     numbers = space.mesh.topology.original_cell_index
     found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
@@ -331,7 +331,7 @@ def _tail(space: Any, owned: np.ndarray) -> list[float]:
 
     Args:
         space: function space of the unknowns that belong to cells.
-        owned: entries that this rank owns: its unknowns of `space`, then on the last rank those that belong to no cell.
+        owned: entries that this rank owns: its unknowns of `space`, then on the last rank the others.
     """
     return space.mesh.comm.allgather(owned[space.dofmap.index_map.size_local:].tolist())[-1]
 

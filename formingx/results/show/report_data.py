@@ -312,8 +312,8 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
     """Return the temperature of a sheet in the states of a checkpoint.
 
     Args:
-        states: data of each state. The entry "memory" has the stored history variables; that of the temperature has
-            "points", reference positions, and "temperature", values there.
+        states: data of each state. The entry "memory" has the stored history variables; the entry of the temperature
+            has "points", reference positions, and "temperature", values there.
         last: profile of the sheet with m nodes, in the last state.
 
     Returns:
