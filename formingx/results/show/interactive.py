@@ -80,8 +80,8 @@ def _sheet(record: ReportData, units: Units) -> dict[str, Any]:
     """Return the data of a sheet for `report.js`, at no more than 101 stations along it and in the drawn states.
 
     Entries are "from" and "material", name and reference coordinates of the stations, and "bottom" and "top", the faces
-    (r, z) in each drawn state (`ReportData.frames`). "fields" has {label: values in each drawn state}: wall, wall ratio and
-    all fields of the record, such as the stress.
+    (r, z) in each drawn state (`ReportData.frames`). "fields" has {label: values in each drawn state}: wall, wall
+    ratio and all fields of the record, such as the stress.
     """
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, FRAMES + 1)).round().astype(int))
