@@ -141,8 +141,7 @@ class ContactLaw:
     Attributes:
         theta: half-width of the contact ramp, length: contact begins at the signed distance -theta.
         elastic_slip: elastic slip at which a point begins to slide, length.
-        shift: length by which signed distances are reduced, a number or one for each point, shape (n,). Points that
-            touch the tool in the reference configuration are then free of stress.
+        shift: reduction of the signed distances, length, a number or shape (n,): first contact is free of stress.
         has_friction: True if tractions depend on the slip.
         has_history: True if tractions depend on the history variables (`ContactHistory`).
         adhesive: True if points in contact can carry tension; `energy` is then the energy of the bond (`Path.work`).
