@@ -71,7 +71,7 @@ def measure(case, elements, profile=None):
 
     Set-up is the time of a run up to the unloaded state (forms, columns, the first factorisation with its analysis).
     The linear algebra is measured in the run itself, where other work empties the caches. "look ahead" is the time of
-    `Curve.look_ahead` at a state.
+    `Curve.update_path_tangent` at a state.
 
     Args:
         profile: a `cProfile.Profile` that records the run, or None.
@@ -81,7 +81,7 @@ def measure(case, elements, profile=None):
     fx.trace(scene, until=fx.pressure(0.0), progress=False)
     setup = time.process_time() - began
     with clocked((Problem, "tangent"), (DirectSolver, "factorise"), (DirectSolver, "solve_all"),
-                 (Curve, "look_ahead")) as spent, profile or contextlib.nullcontext():
+                 (Curve, "update_path_tangent")) as spent, profile or contextlib.nullcontext():
         began = time.process_time()
         path = fx.trace(scene, until=target, step=fx.StepControl(target=8) if scene.contacts else None, progress=False)
         spent_on_path = time.process_time() - began - setup

@@ -46,7 +46,7 @@ def test_entries_of_the_inverse(solver):
 def test_sparse_right_hand_sides(solver, monkeypatch):
     """Right-hand sides that are zero in most rows have the same solutions as sparse and as dense ones."""
     made, dense = solver
-    monkeypatch.setattr(linear, "CONDENSATION", linear.Condensation(rows=N // 4))
+    monkeypatch.setattr(linear, "CONDENSATION", linear.Condensation(min_rows=N // 4))
     random = np.random.default_rng(4)
     rhs = np.zeros((N, 3))
     rhs[ROWS[:4]] = random.normal(size=(4, 3))
@@ -70,7 +70,7 @@ def test_condensed_solutions_are_the_full_ones(solver, monkeypatch):
     def moved(dx, step):
         return dx[ROWS] * 2 - np.multiply.outer(np.arange(len(ROWS)), step)
     full = compliance.columns(made, E, border)
-    monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(columns=7, rows=N))
+    monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(min_columns=7, min_rows=N))
     condensed = compliance.columns(made, E, border)
     assert isinstance(full, compliance.Columns) and isinstance(condensed, compliance.CondensedColumns)
     forces = random.normal(size=(7, 2))
@@ -87,7 +87,7 @@ def test_a_cup_with_condensed_solutions(monkeypatch):
     made = []
     condensed = compliance.CondensedColumns.__init__
     monkeypatch.setattr(compliance.CondensedColumns, "__init__", lambda *args: made.append(1) or condensed(*args))
-    monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(columns=0, rows=0))
+    monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(min_columns=0, min_rows=0))
     found = form(cup("stick", (30, 1)), 10.0)
     assert made and found.counts.iterations == full.counts.iterations
     assert found.profile().thickness == pytest.approx(full.profile().thickness, rel=1e-8)

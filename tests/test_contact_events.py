@@ -12,7 +12,8 @@ from without import run_without
 
 import formingx as fx
 from formingx.contact.step_limit import TrialStep
-from formingx.extensions.contact_events.event_sequence import ContactEventSequence, _Segment
+from formingx.extensions.contact_events.event_sequence import ContactEventSequence
+from formingx.extensions.contact_events.path_segment import PathSegment
 from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame
 from formingx.extensions.contact_events.response import Response
 from formingx.physics.contact_law import ContactStatus
@@ -30,9 +31,9 @@ print(fx.__file__, path.counts.steps, *path.profile().thickness)
 """
 
 
-def response_ahead(curve, state):
+def response_at(curve, state):
     """Return the linearised response of the body ahead of a state of a curve."""
-    assert curve.factorise_ahead(state)
+    assert curve.factorise_one_sided(state)
     return Response(curve, state, *(curve.problem.x.duplicate() for _ in range(2)))
 
 
@@ -66,7 +67,7 @@ def test_a_predicted_step_ends_near_its_state():
         trial = TrialStep(old.x, old.control, old.direction, old.slope, length, problem.limit.predict(curve, old))
         problem.limit.length(trial)
         dx, dc = problem.limit.prepare(trial)
-        V, steps = response_ahead(curve, old).to_points([np.array([point])])
+        V, steps = response_at(curve, old).to_points([np.array([point])])
         F = problem.x.duplicate()
         x = problem.x.duplicate()
         h = 1e-6
@@ -100,9 +101,9 @@ def test_sliding_points_move_as_in_the_tangent():
     sliding = 0
     for old in path.states[2:-1]:
         with problem.state_context(old):
-            faces = problem.present
+            faces = problem.active_contacts
             ahead = ContactEventSequence(faces, n, old.x, old.control, old.direction, old.slope,
-                                         response_ahead(curve, old), 4)
+                                         response_at(curve, old), 4)
             law = faces[1].tractions(old.x[:n], old.control)
             nothing = ahead.bend(1e-12)
             assert nothing is not None and np.abs(nothing[0]).max() < 1e-8
@@ -144,7 +145,7 @@ def test_events_of_sliding_beside_sticking_points(monkeypatch):
 
     def recorded(sequence, k, length):
         closure = find(sequence, k, length)
-        times.append(sequence.ends if closure is None else closure.time)
+        times.append(sequence.ends if closure is None else closure.arc_length)
         return closure
 
     monkeypatch.setattr(ContactEventSequence, "next", recorded)
@@ -199,7 +200,7 @@ def test_anderson_mixing_converges_where_iterations_oscillate():
 
     def piece(x):
         none = np.zeros((0, 2))
-        return _Segment(x[0], x[None], np.zeros((1, 2)), np.zeros(0), none, none, none, none, none, (x, x[1]))
+        return PathSegment(x[0], x[None], np.zeros((1, 2)), np.zeros(0), none, none, none, none, none, (x, x[1]))
     starts = [fixed + offset for offset in ([0.1, 0.3], [-0.3, -0.1], [0.2, 0.05])]
     tried = [(piece(x), piece(fixed + grows * (x - fixed))) for x in starts]
     found = ContactEventSequence._anderson_mixture(SimpleNamespace(_comm=MPI.COMM_SELF), tried)

@@ -25,8 +25,8 @@ def test_limit_point_under_fixed_control():
     """The limit pressure is told from the slopes of the path: that of `trace`, without having passed it."""
     error, found = failure(lambda: fx.solve(treloar(), to=1.0, increments=5))
     limit = fx.trace(treloar(), until=fx.pole_stretch(3.0), progress=False).limit_points[0].measures["pressure"]
-    assert found.limit_ahead == pytest.approx(limit, rel=1e-6)
-    assert found.control < found.limit_ahead < found.aimed
+    assert found.next_limit_point == pytest.approx(limit, rel=1e-6)
+    assert found.control < found.next_limit_point < found.aimed
     assert "a limit point lies ahead" in str(error) and "trace" in found.advice[0]
     assert found.step == len(error.path) and found.turned == () and found.smallest_J > 0.99
 
@@ -197,7 +197,7 @@ try:
 except fx.ConvergenceError as error:
     d = error.diagnosis
     if MPI.COMM_WORLD.rank == 0:
-        print(json.dumps([d.limit_ahead, d.smallest_J, d.condition, d.at_J.R, len(d.causes)]))
+        print(json.dumps([d.next_limit_point, d.smallest_J, d.condition, d.at_J.R, len(d.causes)]))
 """
 
 

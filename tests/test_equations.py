@@ -43,12 +43,12 @@ class Arch(Equations):
         self.force_scale = float(np.hypot(control, pull))
         out.array_w[:] = load(x.array_r[0]) - pull - control, pull
 
-    def tangent(self, x, control, ahead=False):
+    def tangent(self, x, control, one_sided=False):
         s, slope = self.spring, 3 * (x.array_r[0] - 1) ** 2 - 0.5
         self._fill(self.matrix, np.array([[slope + s, -s], [-s, s]]))
         return self.matrix
 
-    def control_derivative(self, x, control, out, ahead=False):
+    def control_derivative(self, x, control, out, one_sided=False):
         out.array_w[:] = -1.0, 0.0
 
     def inner(self, a, b):

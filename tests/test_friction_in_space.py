@@ -90,7 +90,7 @@ def test_tractions_have_their_stiffness():
         quotient = (law.tractions(x + e, old).force - law.tractions(x - e, old).force) / 2e-7
         np.testing.assert_allclose(found.stiffness[:, :, k], quotient, atol=1e-6)
     closure = law.closure_at_pressure(old, np.full(6, 0.12))
-    np.testing.assert_allclose(law.pressure_ahead(old._replace(closure=closure)), 0.12)
+    np.testing.assert_allclose(law.friction_pressure(old._replace(closure=closure)), 0.12)
 
 
 def test_pressure_on_tools_has_its_derivatives():

@@ -78,18 +78,18 @@ def test_tool_distances_are_evaluated_once_for_the_same_points(monkeypatch):
 
 @pytest.mark.parametrize("friction", ["stick", "none"])
 def test_the_path_tangent_uses_the_stored_factors(monkeypatch, friction):
-    update_ahead, found, changed = BorderedNewton.update_ahead, [], [0.0]
+    update_one_sided, found, changed = BorderedNewton.update_one_sided, [], [0.0]
 
     def beside_other_factors(self, x, control):
         before = self.b.array_r.copy()
-        found.append(update_ahead(self, x, control))
+        found.append(update_one_sided(self, x, control))
         now = self.b.array_r.copy()
-        assert self.tangent(x, control, ahead=True)
+        assert self.tangent(x, control, one_sided=True)
         size = np.abs(self.b.array_r).max()
         changed.append(np.abs(now - before).max() / size)
         np.testing.assert_allclose(now, self.b.array_r, atol=1e-6 * size)
         return True
-    monkeypatch.setattr(BorderedNewton, "update_ahead", beside_other_factors)
+    monkeypatch.setattr(BorderedNewton, "update_one_sided", beside_other_factors)
     fx = limit.fx
     path = fx.trace(cup(friction, nodes_per_step=1), until=fx.pressure(8.0), progress=False,
                     tolerances=fx.Tolerances(correction=1e-14))     # the last factors are those of the state

@@ -99,7 +99,7 @@ def test_work_ahead_is_that_of_the_pressure_on_the_volume_that_grows():
     for state in (path.states[3], limit, path.last):
         ends = [curve.value(volume, state.x + by * state.direction, state.control + by * state.slope) for by in (h, -h)]
         growth = (ends[0] - ends[1]) / (2 * h)
-        work = curve.work_ahead(state) * forms.stress * forms.volume / forms.control_scale
+        work = curve.work_rate(state) * forms.stress * forms.volume / forms.control_scale
         assert work == pytest.approx(growth, rel=1e-6) and growth > 0
     assert not any(snaps(curve, state, "continue_volume", 1.0) for state in (path.states[3], limit, path.last))
     back = replace(path.states[3], direction=-path.states[3].direction, slope=-path.states[3].slope)

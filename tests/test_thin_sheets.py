@@ -87,7 +87,7 @@ def test_a_point_that_lifts_off_gives_up_its_shear_first():
 
 def test_few_iterations_for_the_events_of_a_step(monkeypatch, caplog):
     """With its work used up a step takes one gap closure, and the log says so."""
-    monkeypatch.setattr(event_sequence, "_SETTINGS", replace(event_sequence._SETTINGS, work=2))
+    monkeypatch.setattr(event_sequence, "_SETTINGS", replace(event_sequence._SETTINGS, max_work=2))
     with caplog.at_level(logging.INFO, "formingx"):
         path = pushed(travel=3.0)
     assert "contact events of this step took too many iterations: it takes one gap closure" in caplog.text
@@ -97,7 +97,7 @@ def test_few_iterations_for_the_events_of_a_step(monkeypatch, caplog):
 def test_a_jump_ends_after_the_iterations_of_its_step(caplog):
     """The iterations of a step bound its jumps, and the log says so."""
     path = pushed(travel=1.0)
-    settings, curve = snap_through.SnapThrough(iterations=20), path.record.curve
+    settings, curve = snap_through.SnapThrough(max_iterations=20), path.record.curve
     curve.spend(21)
     with caplog.at_level(logging.INFO, "formingx"), pytest.raises(snap_through.Failure, match="more than 20 Newton"):
         snap_through.snap_through(curve, path.last, 1e-4, False, settings)

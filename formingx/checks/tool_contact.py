@@ -74,7 +74,7 @@ def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
     """Return True if a contact point of one of the given `FaceContact` objects touches its tool in a state."""
     with problem.state_context(state):
         return any(resultants.length(contact, state.x, state.control) > 0 for contact in contacts
-                   if contact in problem.present)
+                   if contact in problem.active_contacts)
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:

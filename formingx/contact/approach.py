@@ -25,49 +25,51 @@ class StepLimits:
     belong to the last accepted state.
 
     Attributes:
-        closed_at_start: fraction of a step; gaps that close earlier in the step count as closed at its start.
+        start_fraction: fraction of a step; gaps that close earlier in the step count as closed at its start.
         overshoot: length of a step that ends at a gap closure, over the arc length to the closure.
         negligible_gap: distance from the outer edge of the ramp, over the thickness of the sheet, that is negligible.
-        frictionless_from: fraction of a step. If the gap of a sticking point closes in the rest of the step, friction
+        friction_fraction: fraction of a step. If the gap of a sticking point closes in the rest of the step, friction
             acts on the point from the next step on only.
-        largest_slip: largest slip of a sticking point after its gap closure in a step, over its tributary length.
-        largest_approach: largest motion of a point in a step of lagged contact, less its tributary length, over its
+        max_slip_ratio: largest slip of a sticking point after its gap closure in a step, over its tributary length.
+        max_approach_ratio: largest motion of a point in a step of lagged contact, less its tributary length, over its
             gap.
-        largest_cut: largest depth of the straight path of a point inside a tool, over its tributary length.
-        most_positions: largest number of positions at which this path is checked.
-        pressure_change: largest predicted change of the pressure in a step of lagged friction, over the pressure.
-        pressure_difference: allowed difference between the pressure at the end of the step and the pressure that bounds
-            friction, over the pressure.
-        corrections: largest number of repeated solutions of a step that reduce this difference.
-        difference_at_target: allowed difference between the contact pressure of a state at a target and the pressure
+        max_cut_ratio: largest depth of the straight path of a point inside a tool, over its tributary length.
+        max_positions: largest number of positions at which this path is checked.
+        max_pressure_change: largest predicted change of the pressure in a step of lagged friction, over the pressure.
+        max_pressure_difference: allowed difference between the pressure at the end of the step and the pressure that
+            bounds friction, over the pressure.
+        max_corrections: largest number of repeated solutions of a step that reduce this difference.
+        max_target_difference: allowed difference between the contact pressure of a state at a target and the pressure
             with which it was solved, over the pressure.
-        rejected_change: multiple of `pressure_change`; a solved step with a larger change of the pressure is rejected.
-        settling: number of Newton iterations that lagged friction needs in a step, however short the step is.
-        least_force: normal force, over shear modulus times thickness times length, that is added to the denominator of
+        rejection_ratio: multiple of `max_pressure_change`; a solved step with a larger change of the pressure is
+            rejected.
+        settling_iterations: number of Newton iterations that lagged friction needs in a step, however short the step
+            is.
+        min_force: normal force, over shear modulus times thickness times length, that is added to the denominator of
             relative changes of the pressure: lightly loaded contacts do not limit the step.
-        shortest: arc length (dimensionless) below which a step is rejected neither for a change of the pressure nor for
-            the slip of a point after its gap closure.
-        shortest_mixed: arc length (dimensionless) below which sticking points may lift off while the gaps of others
+        min_length: arc length (dimensionless) below which a step is rejected neither for a change of the pressure nor
+            for the slip of a point after its gap closure.
+        min_mixed_length: arc length (dimensionless) below which sticking points may lift off while the gaps of others
             close.
     """
 
-    closed_at_start: float = 0.02
+    start_fraction: float = 0.02
     overshoot: float = 1.001
     negligible_gap: float = 1e-3
-    frictionless_from: float = 0.95
-    largest_slip: float = 2e-3
-    largest_approach: float = 0.7
-    largest_cut: float = 0.5
-    most_positions: int = 4000
-    pressure_change: float = 0.2
-    pressure_difference: float = 5e-3
-    corrections: int = 3
-    difference_at_target: float = 1e-4
-    rejected_change: float = 1.4
-    settling: int = 2
-    least_force: float = 1e-2
-    shortest: float = 1e-4
-    shortest_mixed: float = 5e-4
+    friction_fraction: float = 0.95
+    max_slip_ratio: float = 2e-3
+    max_approach_ratio: float = 0.7
+    max_cut_ratio: float = 0.5
+    max_positions: int = 4000
+    max_pressure_change: float = 0.2
+    max_pressure_difference: float = 5e-3
+    max_corrections: int = 3
+    max_target_difference: float = 1e-4
+    rejection_ratio: float = 1.4
+    settling_iterations: int = 2
+    min_force: float = 1e-2
+    min_length: float = 1e-4
+    min_mixed_length: float = 5e-4
 
 
 LIMITS = StepLimits()
@@ -130,17 +132,17 @@ class Approach:
         start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
         free = ~face.law.touching(start, face.history)
         if face.contact.lagged:                             # a tangent of a long step predicts no gap closures
-            most = LIMITS.largest_approach * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
+            most = LIMITS.max_approach_ratio * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
             speed = np.linalg.norm(velocity, axis=1)
             most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
             length = combined(self._comm, float(most.min(initial=length)), MPI.MIN)
             length = self._within_pressure_change(start, velocity, length)
-        times = gap_closures(face.law, start, velocity, free, length)
-        ahead = (times > LIMITS.closed_at_start * length) & (times < length)
-        times = np.sort(gathered(self._comm, times[ahead]))
+        arc_lengths = gap_closures(face.law, start, velocity, free, length)
+        ahead = (arc_lengths > LIMITS.start_fraction * length) & (arc_lengths < length)
+        arc_lengths = np.sort(gathered(self._comm, arc_lengths[ahead]))
         touching = combined(self._comm, int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
         allowed = self.max_closures if touching > 1 else 1
-        return min(LIMITS.overshoot * times[allowed - 1], length) if len(times) >= allowed else length
+        return min(LIMITS.overshoot * arc_lengths[allowed - 1], length) if len(arc_lengths) >= allowed else length
 
     def closures(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
                  length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -160,15 +162,15 @@ class Approach:
         face = self.face
         start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
         free = ~face.law.touching(start, face.history) & (face.rule.area > 0)
-        times = gap_closures(face.law, start, velocity, free, length)
-        return times, start + times[:, None] * velocity
+        arc_lengths = gap_closures(face.law, start, velocity, free, length)
+        return arc_lengths, start + arc_lengths[:, None] * velocity
 
-    def prepare(self, times: np.ndarray, places: np.ndarray, length: float, ends: bool,
+    def prepare(self, arc_lengths: np.ndarray, places: np.ndarray, length: float, ends: bool,
                 guessed: np.ndarray | None = None, speeds: np.ndarray | None = None) -> None:
         """Prepare the solve of a step: store the predicted positions at which gaps close.
 
         Args:
-            times: arc lengths at which gaps close, shape (n,); `length` for gaps that stay open.
+            arc_lengths: arc lengths at which gaps close, shape (n,); `length` for gaps that stay open.
             places: positions of the points at these arc lengths, relative to the tool, shape (n, c), length.
             length: arc length of the step (dimensionless).
             ends: True if `StepLimit.check` will shorten the step to a gap closure whose point slips too far, or against
@@ -179,13 +181,13 @@ class Approach:
                 None: unknown.
         """
         face = self.face
-        self._predicted_closures = combined(self._comm, int(np.sum(times < length)), MPI.SUM)
+        self._predicted_closures = combined(self._comm, int(np.sum(arc_lengths < length)), MPI.SUM)
         if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
-            at_end = ends & face.contact.sticks & (times >= LIMITS.frictionless_from * length)
+            at_end = ends & face.contact.sticks & (arc_lengths >= LIMITS.friction_fraction * length)
             if speeds is not None and at_end.any():
                 tangent = face.law.part(np.flatnonzero(at_end)).nearest(places[at_end]).tangent
-                slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - times[at_end])
-                at_end[at_end] = slip <= LIMITS.largest_slip * face.rule.lengths[at_end]
+                slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - arc_lengths[at_end])
+                at_end[at_end] = slip <= LIMITS.max_slip_ratio * face.rule.lengths[at_end]
             face.set_closures(np.where(at_end[:, None], np.nan, places), guessed)
         elif ends and self.has_lagged_friction:
             face.set_closures(places)
@@ -241,14 +243,14 @@ class Approach:
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            True if the pressure was updated. False if both pressures agree to `StepLimits.pressure_difference`, or
+            True if the pressure was updated. False if both pressures agree to `StepLimits.max_pressure_difference`, or
             friction is not lagged.
         """
         if not self.has_lagged_friction:
             return False
         face, law = self.face, self.face.law
         now = face.tractions(new, control).normal
-        if self._pressure_difference(now, law.pressure_ahead(face.history)) <= LIMITS.pressure_difference:
+        if self._pressure_difference(now, law.friction_pressure(face.history)) <= LIMITS.max_pressure_difference:
             return False
         face.set_closures(law.closure_at_pressure(face.history, now))
         return True
@@ -264,7 +266,7 @@ class Approach:
             control: load parameter (control) of the state, dimensionless.
 
         Returns:
-            True if the pressure was replaced. False if both agree to `StepLimits.difference_at_target` in the
+            True if the pressure was replaced. False if both agree to `StepLimits.max_target_difference` in the
             area-weighted 1-norm, or no pressure is lagged.
         """
         face, law, variables = self.face, self.face.law, self.face.get()
@@ -273,15 +275,15 @@ class Approach:
         old, depth = variables.history, np.maximum(law.distance(face.positions(new, control)), 0.0)
         history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), closure=old.position)
         now = law.pressure(history)
-        sums = np.array([face.rule.area @ np.abs(now - law.pressure_ahead(old)), face.rule.area @ now])
+        sums = np.array([face.rule.area @ np.abs(now - law.friction_pressure(old)), face.rule.area @ now])
         change, pressure = combined(self._comm, sums, MPI.SUM)
-        if change <= LIMITS.difference_at_target * (pressure + LIMITS.least_force * face.force_scale):
+        if change <= LIMITS.max_target_difference * (pressure + LIMITS.min_force * face.force_scale):
             return False
         face.put(variables._replace(history=history))
         return True
 
     def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """Return the arc length of a step in which the contact pressure changes by `StepLimits.pressure_change`.
+        """Return the arc length of a step in which the contact pressure changes by `StepLimits.max_pressure_change`.
 
         The pressure that bounds lagged friction is extrapolated linearly.
 
@@ -298,13 +300,13 @@ class Approach:
         law, history = self.face.law, self.face.history
         rate = law.k * np.einsum("ni,ni->n", law.motion(start, history).normal, velocity)
         change = self._pressure_difference(law.pressure(history) + length * rate)
-        return length * min(LIMITS.pressure_change / change, 1.0) if change else length
+        return length * min(LIMITS.max_pressure_change / change, 1.0) if change else length
 
     def _pressure_difference(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
         """Return the relative difference between two pressure fields in the area-weighted 1-norm.
 
         The difference is summed over the points that were under pressure at the last accepted state. It is divided by
-        the total normal force at that state plus a small force (`StepLimits.least_force`).
+        the total normal force at that state plus a small force (`StepLimits.min_force`).
 
         Args:
             normal: normal tractions, shape (n,), stress; tension counts as 0.
@@ -317,7 +319,7 @@ class Approach:
         difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
         sums = np.array([face.rule.area @ np.where(before > 0, difference, 0.0), face.rule.area @ before])
         change, pressure = combined(self._comm, sums, MPI.SUM)
-        return float(change / (pressure + LIMITS.least_force * face.force_scale))
+        return float(change / (pressure + LIMITS.min_force * face.force_scale))
 
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
         """Return True if sticking points lifted off and moved back along the tool while other gaps closed.
@@ -359,7 +361,7 @@ class Approach:
     def cuts_tool(self, a: np.ndarray, b: np.ndarray) -> bool:
         """Return True if the straight path of a point between two positions penetrates the tool too deeply.
 
-        The depth on the path may exceed the larger depth of its ends by `StepLimits.largest_cut` times the tributary
+        The depth on the path may exceed the larger depth of its ends by `StepLimits.max_cut_ratio` times the tributary
         length. A point that slides over an edge of the tool may cut the edge off by this depth.
 
         Args:
@@ -370,13 +372,13 @@ class Approach:
             True if a path on any rank is too deep.
         """
         law, lengths = self.face.law, self.face.rule.lengths
-        path_length, most = np.linalg.norm(b - a, axis=1), LIMITS.largest_cut * lengths
+        path_length, most = np.linalg.norm(b - a, axis=1), LIMITS.max_cut_ratio * lengths
         first, last = law.distance(a), law.distance(b)
         ends, between = np.maximum(np.maximum(first, last), 0.0), (first + last + path_length) / 2    # bound of depths
         far = np.flatnonzero((between > ends + most) & (lengths > 0))
         found = False
         if len(far):
-            parts = int(min(np.ceil((path_length / most)[far].max() * 2), LIMITS.most_positions)) + 1
+            parts = int(min(np.ceil((path_length / most)[far].max() * 2), LIMITS.max_positions)) + 1
             places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
             found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
         return bool(combined(self._comm, found, MPI.LOR))
@@ -386,7 +388,7 @@ class Approach:
         """Return the fraction of a step at which the first gap closes whose point then slips in a wrong way.
 
         There are two wrong ways. A sticking point without a predicted gap closure carries no friction in the step, but
-        moved along the tool by more than `StepLimits.largest_slip`. A point with Coulomb friction slides at the end
+        moved along the tool by more than `StepLimits.max_slip_ratio`. A point with Coulomb friction slides at the end
         against the slip since its gap closure. Pressure and slip are assumed to grow from the gap closure on, at their
         rates at the end of the step, along (direction, slope).
 
@@ -410,7 +412,7 @@ class Approach:
         since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
         slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
         if face.contact.sticks:
-            wrong = np.isnan(history.closure[:, 0]) & (np.abs(slid) > LIMITS.largest_slip * face.rule.lengths)
+            wrong = np.isnan(history.closure[:, 0]) & (np.abs(slid) > LIMITS.max_slip_ratio * face.rule.lengths)
         else:
             counted = np.einsum("ni,ni->n", near.tangent, end - history.closure)
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)

@@ -3,35 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from ..errors import InputError
 from ..forms.history import Start
 from ..forms.transfer import MovingLeastSquares
 from ..physics.contact import Contact
 from ..physics.contact_law import ContactHistory, Tractions
+from .face_history import FaceHistory
 from .increment import Increment
 from .rule import Gauss, Lobatto, Rule, Vertices
 
 _SAME_STIFFNESS = 1e-3
 """Relative difference of the stiffness of a point below which the stored tangent serves for the next step."""
-
-
-class FaceHistory(NamedTuple):
-    """History variables of the points of a face at the last accepted state.
-
-    Attributes:
-        history: history variables of the contact law.
-        newly_closed: mask of the points that came into contact in the step to this state, shape (n,).
-        penalty: penalty with which the state was solved for, over the reference penalty, shape (n,)
-            (`Contact.present_area`).
-    """
-
-    history: ContactHistory
-    newly_closed: np.ndarray
-    penalty: np.ndarray
 
 
 class FaceContact:
@@ -50,9 +35,9 @@ class FaceContact:
         points: their reference positions, shape (n, components), length.
         law: contact law at the points.
         thickness: thickness of the body behind the face, length.
-        increment: the present `Increment`.
-        present: True if the contact is active in the stage.
-        shift: reduction of the distances, shape (n,), length, or None.
+        increment: the current `Increment`.
+        active: True if the contact is active in the stage.
+        shift: reduction of the signed distances from the tool after a remeshing, shape (n,), length; else None.
         unbalanced: resultant of contact forces minus nodal forces of the body, due to round-off of positions, shape
             (components,), stress length^2. Perturbed runs of a design sensitivity set it; `force` subtracts it.
     """
@@ -78,15 +63,15 @@ class FaceContact:
         self._stored: FaceHistory | None = None
         self.start()
 
-    def enter(self, base: float, rate: float, present: bool) -> None:
+    def enter(self, base: float, rate: float, active: bool) -> None:
         """Set the step data of a stage.
 
         Args:
             base: travel of the tool at control 0, over the length scale of the forms.
             rate: its derivative by the control.
-            present: True if the contact is active in the stage.
+            active: True if the contact is active in the stage.
         """
-        self._base, self._rate, self.present = base, rate, present
+        self._base, self._rate, self.active = base, rate, active
 
     def shift_distances(self, shift: np.ndarray) -> None:
         """Reduce the signed distances of the points from the tool by `shift`, shape (n,), length, after remeshing."""
@@ -98,7 +83,7 @@ class FaceContact:
         return None if self._warm is None else self.rule.at_points(self._solid.temperature.at_nodes(self._warm))
 
     def update_temperature(self) -> None:
-        """Update the coefficient of friction at the points to the present temperature of the body.
+        """Update the coefficient of friction at the points to the current temperature of the body.
 
         Raises:
             InputError: friction has no finite value at a temperature.
@@ -136,7 +121,7 @@ class FaceContact:
         return motion - np.multiply.outer(self._travel_vector, self._rate * step) if self._rate else motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
-        """Return the contact tractions at the points in a state; at the state last linearised, of the linearised law.
+        """Return the contact tractions at the points in a state; after `linearise` there, of the linearised law.
 
         fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
         """
@@ -168,7 +153,10 @@ class FaceContact:
 
     @property
     def stiffness_in_tangent(self) -> np.ndarray:
-        """Derivative of the forces in the residual by the positions in the last tangent, shape (n, c, c), 1/length."""
+        """Derivative of the forces in the residual by the positions of their points, in the last tangent, 1/length.
+
+        Shape (n, components, components).
+        """
         return self._scale[:, None, None] * self._in_tangent
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
@@ -210,25 +198,26 @@ class FaceContact:
         """Linearise the contact law for a Newton iteration at a state.
 
         Args:
-            values: locally owned entries of the residual F; the linearised minus the actual contact forces are added.
+            values: locally owned entries of the residual F, in which the contact forces are replaced by the forces of
+                the linearised law.
             fields: locally owned unknowns of the state.
             control: load parameter (control) of the state, dimensionless.
         """
         self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
 
-    def tangent(self, fields: np.ndarray, control: float, ahead: bool = False) -> np.ndarray:
+    def tangent(self, fields: np.ndarray, control: float, one_sided: bool = False) -> np.ndarray:
         """Return the derivative of the contact forces by the unknowns, and store it as the last tangent.
 
         Args:
             fields: locally owned unknowns of the state.
             control: load parameter (control) of the state, dimensionless.
-            ahead: True for the derivative towards the next step at an accepted state, where just closed points are
+            one_sided: True for the derivative towards the next step at an accepted state, where just closed points are
                 stiff.
 
         Returns:
-            For each point the stiffness by its unknowns (`Rule.dofs`), shape (n, m, m).
+            Derivative of the dimensionless nodal forces of each point by its m unknowns (`Rule.dofs`), shape (n, m, m).
         """
-        self._in_tangent = self._stiffness(fields, control, ahead)
+        self._in_tangent = self._stiffness(fields, control, one_sided)
         return self._of_unknowns(self._in_tangent)
 
     def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -236,9 +225,9 @@ class FaceContact:
         return self._of_unknowns(self._stiffness(fields, control, False))
 
     def hoop_stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the derivative of circumferential contact forces by circumferential motions, shape (n, m/2, m/2).
+        """Return the derivative of circumferential contact forces by circumferential motions of the nodes.
 
-        The second variation of non-axisymmetric modes uses this stiffness; see `ContactLaw.hoop_stiffness`.
+        The shape is (n, k, k) with the k nodes of each point. The second variation of non-axisymmetric modes uses it.
         """
         radius = np.full(len(self.points), np.inf)
         if self._solid.scene.kinematics.axisymmetric:
@@ -247,34 +236,43 @@ class FaceContact:
         both[:, 0, 0] = self.law.hoop_stiffness(self.positions(fields, control), self.history, radius)
         return self._of_unknowns(both)[:, ::2, ::2]
 
-    def change_ahead(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the stiffness towards the next step (`ahead` of `tangent`) minus the stiffness in the last tangent.
+    def one_sided_change(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Return the stiffness at an accepted state towards the next step, minus the stiffness in the last tangent.
 
-        The state is an accepted one. Shape (n, c, c), stress/length; 0 for points whose relative change is below 1e-3.
+        Shape (n, components, components), stress/length. It is 0 for points at which no entry of the stiffness changes
+        by more than 1e-3 of the largest entry in the last tangent.
         """
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
         return np.where(np.abs(change).max((1, 2), keepdims=True) > least, change, 0.0)
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,
-                               ahead: bool = False) -> None:
+                               one_sided: bool = False) -> None:
         """Add the derivative of the contact forces by the control, through the travel of the tool, to `values`.
 
-        ahead: True for the derivative towards the next step, as in `tangent`.
+        values: locally owned entries of dF/dcontrol, changed in place. one_sided: True for the derivative towards the
+        next step, at an accepted state.
         """
         if self._rate:
-            stiffness = self._stiffness(fields, control, ahead)
+            stiffness = self._stiffness(fields, control, one_sided)
             self.add(values, -self._scale[:, None] * (stiffness @ (self._rate * self._travel_vector)))
 
-    def _stiffness(self, fields: np.ndarray, control: float, ahead: bool) -> np.ndarray:
-        """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length."""
-        if ahead:
+    def _stiffness(self, fields: np.ndarray, control: float, one_sided: bool) -> np.ndarray:
+        """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length.
+
+        one_sided: True for the derivative towards the next step, at an accepted state, where just closed points are
+        stiff.
+        """
+        if one_sided:
             newly_closed = self._stored.newly_closed if self._stored else np.zeros(len(self.points), dtype=bool)
-            return self.law.stiffness_ahead(self.positions(fields, control), self.history, newly_closed)
+            return self.law.one_sided_stiffness(self.positions(fields, control), self.history, newly_closed)
         return self.tractions(fields, control).stiffness
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
-        """Return dimensionless stiffness by unknowns, shape (n, m, m), from traction derivatives, shape (n, c, c)."""
+        """Return derivatives of dimensionless nodal forces by the m unknowns of each point, shape (n, m, m).
+
+        stiffness: derivatives of the tractions by the positions, shape (n, components, components), stress/length.
+        """
         return self.rule.nodal_stiffness((self._scale * self._length)[:, None, None] * stiffness)
 
     @property
@@ -283,7 +281,7 @@ class FaceContact:
         return self.contact.penalty * self._solid.stress / self.thickness
 
     def _law(self, penalty: np.ndarray | float) -> Any:
-        """Return the contact law at the points; penalty: present over reference penalty, shape () or (n,)."""
+        """Return the contact law at the points; penalty: current over reference penalty, shape () or (n,)."""
         law: Any = self.contact.law(self._reference_penalty * penalty, self.thickness, self.points,
                                     self._temperatures())
         if self.shift is not None:
@@ -291,7 +289,7 @@ class FaceContact:
         return law
 
     def _set_penalty(self, penalty: np.ndarray) -> None:
-        """Set the ratio of the present to the reference penalty, shape (n,), and update the law."""
+        """Set the ratio of the current to the reference penalty, shape (n,), and update the law."""
         if not np.array_equal(penalty, self._penalty):
             self._penalty, self.law = penalty, self._law(penalty)
 
@@ -312,7 +310,10 @@ class FaceContact:
         self._start_at(self.points)
 
     def activate(self, fields: np.ndarray, control: float) -> None:
-        """Set history variables of points without earlier contact, in the state (fields, control) of the activation."""
+        """Set the history variables of points without earlier contact, at the state in which the contact is activated.
+
+        fields: locally owned unknowns of the state.
+        """
         self._start_at(self.positions(fields, control))
 
     def _start_at(self, x: np.ndarray) -> None:
@@ -321,10 +322,11 @@ class FaceContact:
         self._set_history(FaceHistory(self.law.start(x), none, ones) if self.has_history else None)
 
     def set_closures(self, closure: np.ndarray, guessed: np.ndarray | None = None) -> None:
-        """Store the predicted positions of the points at the gap closures of the next step (`ContactHistory.closure`).
+        """Store the predicted positions at which the gaps of the points close in the next step.
 
         Args:
-            closure: positions relative to the tool, shape (n, c), length; NaN for no friction in the step.
+            closure: positions relative to the tool, shape (n, components), length. From there on friction acts on a
+                point; NaN: no friction acts on it in the step.
             guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
         """
         self._guessed = guessed
@@ -339,7 +341,7 @@ class FaceContact:
             control: load parameter (control) of the state, dimensionless.
             start: not used.
         """
-        if self._stored is None or not self.present:
+        if self._stored is None or not self.active:
             return
         old, theta = self._stored.history, self.law.theta
         history = self.law.tractions(self.positions(x, control), old).history
@@ -386,7 +388,7 @@ class FaceContact:
         return float(self._solid.stress * self.thickness * self._length)
 
     def get(self) -> FaceHistory | None:
-        """Return the present history variables; None without history variables."""
+        """Return the current history variables; None without history variables."""
         return self._stored
 
     def put(self, variables: FaceHistory | None) -> None:
@@ -395,7 +397,7 @@ class FaceContact:
             self._set_history(variables)
 
     def _set_history(self, variables: FaceHistory | None) -> None:
-        """Set the history variables, and begin an increment that evaluates states."""
+        """Set the history variables (None: there are none), and begin an increment that evaluates single states."""
         self._stored = variables
         if self.contact.present_area and variables is not None:
             self._set_penalty(variables.penalty)
@@ -403,9 +405,7 @@ class FaceContact:
 
     def save(self, variables: FaceHistory) -> dict[str, np.ndarray]:
         """Return {name: array} of history variables and reference positions of the points of all ranks; collective."""
-        parts = self.comm.allgather((self.points, *variables.history, variables.newly_closed, variables.penalty))
-        names = ("points", *variables.history._fields, "newly_closed", "penalty")
-        return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
+        return variables.saved(self.points, self.comm)
 
     def load(self, data: dict[str, Any]) -> FaceHistory:
         """Return the history variables of the locally owned points from the arrays of `save`.
@@ -413,14 +413,7 @@ class FaceContact:
         Raises:
             InputError: no saved point has the reference position of a point of the face.
         """
-        from scipy.spatial import cKDTree
-        away, rows = cKDTree(np.array(data["points"]).reshape(-1, self.points.shape[1])).query(self.points)
-        if np.any(away > 1e-9 * self._length):
-            raise InputError("checkpoint: a contact point of the scene is not in it: it belongs to another mesh")
-        like = self.law.start(self.points)
-        history = ContactHistory(*(np.array(data[name], dtype=float)[rows].reshape(getattr(like, name).shape)
-                        for name in ContactHistory._fields))
-        return FaceHistory(history, np.array(data["newly_closed"], dtype=bool)[rows], np.array(data["penalty"])[rows])
+        return FaceHistory.loaded(data, self.points, self.law.start(self.points), 1e-9 * self._length)
 
     def transfer(self, source: FaceContact, variables: FaceHistory | None, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> FaceHistory | None:

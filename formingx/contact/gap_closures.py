@@ -79,12 +79,12 @@ def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.nda
         Arc length of the first gap closure of each point, shape (n,); `length` for points that stay open or were
         closed.
     """
-    times, profile = np.full(len(start), float(length)), law.profile
+    arc_lengths, profile = np.full(len(start), float(length)), law.profile
     if profile is not None:
         _compiled().gap_closures(len(start), address(start), address(velocity), address(free), 16, length / 16,
                                  law.theta, address(law.shift), np.ndim(law.shift), *profile.compiled_table,
-                                 address(times))
-        return times
+                                 address(arc_lengths))
+        return arc_lengths
     at = length / 16 * np.arange(17)
     travels = 1.01 * length * np.linalg.norm(velocity, axis=1)             # bound of the approach of each point
     near = np.flatnonzero(free & (law.distance(start) + travels > -law.theta))
@@ -94,8 +94,8 @@ def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.nda
         k = np.argmax(gap[1:, hit] <= 0, axis=0)
         before, now = np.maximum(gap[k, hit], 0.0), gap[k + 1, hit]
         share = np.divide(before, before - now, out=np.zeros(len(hit)), where=before > 0)
-        times[near[hit]] = at[k] + (at[k + 1] - at[k]) * share
-    return times
+        arc_lengths[near[hit]] = at[k] + (at[k + 1] - at[k]) * share
+    return arc_lengths
 
 
 def crossing(law: Any, i: int, x: np.ndarray, velocity: np.ndarray, earliest: float, accuracy: float,
@@ -120,14 +120,14 @@ def crossing(law: Any, i: int, x: np.ndarray, velocity: np.ndarray, earliest: fl
         shift = law.shift[i] if isinstance(law.shift, np.ndarray) else law.shift
         return float(_compiled().crossing(address(x), address(velocity), law.theta, shift, earliest,
                                           accuracy * law.theta, iterations, *law.profile.compiled_table))
-    law, time = law.part([i]), 0.0
+    law, s = law.part([i]), 0.0
     for _ in range(iterations):
-        near = law.nearest((x + time * velocity)[None])
+        near = law.nearest((x + s * velocity)[None])
         gap, rate = float(near.distance[0]) + law.theta, float(near.normal[0] @ velocity)
         if abs(gap) < accuracy * law.theta or not rate > 0:
             break
-        time = max(time - gap / rate, earliest)
-    return time
+        s = max(s - gap / rate, earliest)
+    return s
 
 
 def _compiled() -> Any:

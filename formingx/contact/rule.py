@@ -183,7 +183,7 @@ class Lobatto(_Nodes):
     def _first_lengths(self) -> np.ndarray:
         """Tributary length of each node on the first mesh of the body, shape (n,), length.
 
-        It is `lengths` times the mean ratio of edge lengths at the node, first mesh over present mesh.
+        It is `lengths` times the mean ratio of edge lengths at the node, first mesh over current mesh.
         """
         if self._brought is None:
             return self.lengths

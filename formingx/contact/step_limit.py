@@ -70,7 +70,7 @@ class State(Start, Protocol):
 class Curve(Protocol):
     """Path solver that stores the LU factors of its last tangent."""
 
-    def factorise_ahead(self, state: State) -> bool:
+    def factorise_one_sided(self, state: State) -> bool:
         """Make sure that the stored LU factors belong to the tangent towards the next step from an accepted state.
 
         An event predictor calls this method before it solves for the compliance of contact points. The tangent is
@@ -162,9 +162,9 @@ class StepLimit:
     ends where the gap of a sticking point closes."""
 
     @property
-    def present(self) -> list[Approach]:
-        """The `Approach` of each contact that is active in the present stage."""
-        return [approach for approach in self._all if approach.face.present]
+    def active_contacts(self) -> list[Approach]:
+        """The `Approach` of each contact that is active in the current stage."""
+        return [approach for approach in self._all if approach.face.active]
 
     @property
     def only_sticks(self) -> bool:
@@ -173,7 +173,7 @@ class StepLimit:
         No point slides then, so the path does not end where points begin to slide. The run may therefore reduce failed
         steps further before it tries a snap-through (`SnapThrough.lengths_for`).
         """
-        faces = [approach.face for approach in self.present if approach.face.law.has_friction]
+        faces = [approach.face for approach in self.active_contacts if approach.face.law.has_friction]
         return bool(faces) and all(face.contact.sticks and not face.contact.lagged for face in faces)
 
     @property
@@ -215,7 +215,7 @@ class StepLimit:
             return found
         n = self._n
         return min([c.step_length(trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length)
-                    for c in self.present], default=trial.length)
+                    for c in self.active_contacts], default=trial.length)
 
     def prepare(self, trial: TrialStep, ends: bool = False) -> tuple[np.ndarray, float] | None:
         """Prepare all active contacts for the solve of a step: store the predicted positions of gap closures.
@@ -230,12 +230,12 @@ class StepLimit:
             owned entries, shape (n,), and of the control. None if it is zero.
         """
         n, found = self._n, trial.events.closures(trial.length) if trial.events else None
-        for k, approach in enumerate(self.present):
+        for k, approach in enumerate(self.active_contacts):
             if approach.face.contact.lagged and not (ends and approach.has_lagged_friction):
                 continue                                    # such a contact uses no predicted gap closures
-            times, places, *predicted = found[k] if found else approach.closures(
+            arc_lengths, places, *predicted = found[k] if found else approach.closures(
                 trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length)
-            approach.prepare(times, places, trial.length, ends, *predicted)
+            approach.prepare(arc_lengths, places, trial.length, ends, *predicted)
         return trial.events.bend(trial.length) if trial.events and found else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> StepRejection | None:
@@ -251,17 +251,17 @@ class StepLimit:
         Returns:
             Reason and admissible fraction of the step; None if the step is accepted.
         """
-        n, contacts = self._n, self.present
+        n, contacts = self._n, self.active_contacts
         if any([c.has_too_many_closures(old.x[:n], old.control, new.x[:n], new.control) for c in contacts]):
             return StepRejection("too many points came into contact in one step")
         if self.passes_through(old, new):
             return StepRejection("a tool would pass through the face that it touches")
         change = max([c.change_of_pressure(new.x[:n], new.control) for c in contacts], default=0.0)
-        if change > LIMITS.rejected_change * LIMITS.pressure_change and length > LIMITS.shortest:
-            return StepRejection("the pressure that limits friction changes", LIMITS.pressure_change / change)
-        if length > LIMITS.shortest_mixed and any([c.opens_and_closes(new.x[:n], new.control) for c in contacts]):
+        if change > LIMITS.rejection_ratio * LIMITS.max_pressure_change and length > LIMITS.min_length:
+            return StepRejection("the pressure that limits friction changes", LIMITS.max_pressure_change / change)
+        if length > LIMITS.min_mixed_length and any([c.opens_and_closes(new.x[:n], new.control) for c in contacts]):
             return StepRejection("points lift off while others come into contact", 0.5)
-        if ends and length > LIMITS.shortest:
+        if ends and length > LIMITS.min_length:
             part = min([c.fraction_to_wrong_slip(new.x[:n], new.control, new.direction[:n], new.slope, length)
                         for c in contacts], default=1.0)
             if part < 1:
@@ -274,7 +274,7 @@ class StepLimit:
 
         The step control does not count them. Friction is lagged on tools in three dimensions.
         """
-        return LIMITS.settling if any(c.has_lagged_friction for c in self.present) else 0
+        return LIMITS.settling_iterations if any(c.has_lagged_friction for c in self.active_contacts) else 0
 
     def separate(self, new: Any) -> bool:
         """Open the contact points under tension at tools in three dimensions, at a converged state.
@@ -285,7 +285,7 @@ class StepLimit:
         Returns:
             True if a point separated, so that the state must be solved for again.
         """
-        return any([c.face.separate(new.x[: self._n], new.control) for c in self.present])
+        return any([c.face.separate(new.x[: self._n], new.control) for c in self.active_contacts])
 
     def close_penetrated(self, new: Any, at_target: bool, sweep: int) -> bool:
         """Close the contact of points that penetrated a tool in three dimensions during a step, at its converged state.
@@ -302,10 +302,10 @@ class StepLimit:
             True if a contact status, or the pressure that bounds friction, changed. The state must then be solved for
             again.
         """
-        n, again = self._n, sweep < LIMITS.corrections
+        n, again = self._n, sweep < LIMITS.max_corrections
         late = [c.face.close_penetrated(new.x[:n], new.control, LIMITS.negligible_gap * c.face.thickness)
-                for c in self.present if at_target or c.has_lagged_friction]
-        return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.present if again)])
+                for c in self.active_contacts if at_target or c.has_lagged_friction]
+        return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.active_contacts if again)])
 
     def renew_pressure(self, new: Any) -> bool:
         """Replace lagged contact pressures by the pressures of a state at a target, and open points in tension.
@@ -318,7 +318,8 @@ class StepLimit:
         Returns:
             True if a pressure or a contact status changed, so that the state must be solved for again.
         """
-        return self.separate(new) or any([c.renew_pressure(new.x[: self._n], new.control) for c in self.present])
+        contacts = self.active_contacts
+        return self.separate(new) or any([c.renew_pressure(new.x[: self._n], new.control) for c in contacts])
 
     def passes_through(self, old: Any, new: Any) -> bool:
         """Return True if a contact point passes through its tool between two states.
@@ -332,4 +333,4 @@ class StepLimit:
             (`Approach.cuts_tool`).
         """
         n = self._n
-        return any([c.passes_through(old.x[:n], old.control, new.x[:n], new.control) for c in self.present])
+        return any([c.passes_through(old.x[:n], old.control, new.x[:n], new.control) for c in self.active_contacts])

@@ -61,7 +61,7 @@ class ControlledLoads(BodyModel):
         self._time[0].value = time
 
     def time_at(self, control: float) -> float:
-        """Return the process time at a value of the control, for the present step data (`StepData`).
+        """Return the process time at a value of the control, for the current step data (`StepData`).
 
         Args:
             control: load parameter (control), dimensionless.
@@ -74,7 +74,7 @@ class ControlledLoads(BodyModel):
 
     @property
     def time_now(self) -> float:
-        """Process time at the present control of the forms."""
+        """Process time at the current control of the forms."""
         return self.time_at(float(self.control.value))
 
     def set_loads(self, setting: Any) -> None:
@@ -83,8 +83,8 @@ class ControlledLoads(BodyModel):
         Args:
             setting: amplitudes of the loads and of the time, and inactive items of the scene (`StepData`).
         """
-        for support, present in self.elastic_supports:
-            present.value = float(not any(self.scene.items[i] is support for i in setting.inactive))
+        for support, factor in self.elastic_supports:
+            factor.value = float(not any(self.scene.items[i] is support for i in setting.inactive))
         for i, (load, base, rate) in enumerate(self._loads):
             active = i not in setting.inactive
             base.value = active * (setting.base[i] if load.driven else load.value)

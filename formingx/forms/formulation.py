@@ -66,12 +66,12 @@ class Formulation(ControlledLoads):
         energy: stored energy divided by stress times volume (UFL, rank 0), or None; without histories the potential.
         dissipation: dissipated power divided by stress times volume (UFL, rank 0), or None.
         damage_energy: energy dissipated by damage, divided by stress times volume (UFL, rank 0), or None.
-        load_values: list of (load, its value at the present stage and control (UFL, the user's units)).
+        load_values: list of (load, its value at the current stage and control (UFL, the user's units)).
         residual: dpotential/dw minus the external virtual work (UFL, rank 1).
         control_derivative: derivative of `residual` with respect to the control, through the loads, or None.
         time_derivative: derivative of `residual` with respect to the control, through the time in materials, or None.
         elastic_supports: list of (support with an energy, `Constant` that is 1 while the support is active, else 0).
-        load_works: virtual work of each load of the scene at its present value (UFL, rank 1, user's units).
+        load_works: virtual work of each load of the scene at its current value (UFL, rank 1, user's units).
         temperature: `Temperature` of the body, or None.
         faces: contact faces of the problem (`FaceContact`); the problem sets them.
         singular_unloaded: True if the body in the reference configuration has no stiffness in some direction.

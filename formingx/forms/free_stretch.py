@@ -27,7 +27,7 @@ class FreeStretch:
         expansion: {layer: its `Expansion`}.
 
     Attributes:
-        stretch: :math:`J_T^{1/3}` at the present time (UFL scalar).
+        stretch: :math:`J_T^{1/3}` at the current time (UFL scalar).
     """
 
     def __init__(self, forms: Any, expansion: dict[str, Any]):

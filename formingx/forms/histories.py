@@ -30,7 +30,7 @@ class Histories:
 
     @property
     def control(self) -> float:
-        """Present value of the load parameter (control) in the forms, dimensionless."""
+        """Current value of the load parameter (control) in the forms, dimensionless."""
         raise NotImplementedError
 
     def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
@@ -64,7 +64,7 @@ class Histories:
 
     @property
     def time(self) -> float:
-        """Process time at the present load parameter (control)."""
+        """Process time at the current load parameter (control)."""
         return self.forms.time_at(self.control)
 
     @property

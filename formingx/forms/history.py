@@ -50,7 +50,7 @@ class History(Protocol):
         """
 
     def get(self) -> Any:
-        """Return the present history variables.
+        """Return the current history variables.
 
         Returns:
             Values that `put` accepts.

@@ -86,7 +86,7 @@ class MaterialHistory:
             self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())
 
     def get(self) -> InternalVariables:
-        """Return the present internal variables.
+        """Return the current internal variables.
 
         Returns:
             The variables and the process time; the arrays are read-only.

@@ -71,7 +71,7 @@ class ExtendedMatrix:
                                   np.concatenate([w for _, w in parts])))
 
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
-        """Assemble the matrix for the present values of the form's functions.
+        """Assemble the matrix for the current values of the form's functions.
 
         Args:
             blocks: list of (dofs, values): local unknowns with ghosts, shape (n, m), and values added to K, shape (n,

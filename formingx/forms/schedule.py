@@ -112,10 +112,10 @@ class StepData:
         """Return step data and control that give the same values in the user's units on the next mesh of a run.
 
         Args:
-            before: unit of each load, support and contact on the present mesh: its value in the user's units at
+            before: unit of each load, support and contact on the current mesh: its value in the user's units at
                 amplitude 1, in the order of `Scene.items`. The last entry, 1, belongs to the process time.
             now: the same units on the next mesh.
-            control: control on the present mesh, dimensionless.
+            control: control on the current mesh, dimensionless.
 
         Returns:
             Step data and control on the next mesh.

@@ -44,7 +44,7 @@ class Tangent:
         Args:
             active: constraints that are active under the step data (`Active`).
             rate: derivative of each item's amplitude by the control, then of the process time (`StepData.rate`).
-            changed: True if the active constraints differ from the present ones.
+            changed: True if the active constraints differ from the current ones.
         """
         if changed:
             self.matrix.constrain(active.bcs, active.rows)

@@ -180,7 +180,7 @@ def fitted_tensors(interpolation: MovingLeastSquares, values: np.ndarray, source
                    target_F: np.ndarray) -> np.ndarray:
     r"""Interpolate symmetric positive definite tensors C of the reference configuration to other points; collective.
 
-    The interpolated quantity is the logarithm of the tensor relative to the present configuration:
+    The interpolated quantity is the logarithm of the tensor relative to the current configuration:
 
     .. math::
         \ln(F^{-T} C F^{-1})

@@ -141,7 +141,7 @@ class _ToolForce(Quantity):
         self._scale = self.size = forms.stress * forms.volume / forms.length
 
     def value(self, x, control):
-        active = [c for c in self._contacts if c.present]
+        active = [c for c in self._contacts if c.active]
         return float(sum(resultants.force(contact, x.array_r, control) @ self._direction for contact in active))
 
     def equation(self, target):

@@ -131,7 +131,7 @@ class ContactLaw:
     * `motion` and `touching` at its beginning, for distances, slips and points in contact.
     * `tractions` in each Newton iteration, for tractions, stiffness and new history variables. The law is linearised at
       the `Motion` that the iteration before predicts.
-    * `stiffness_ahead` at an accepted state, for the tangent towards the next step.
+    * `one_sided_stiffness` at an accepted state, for the tangent towards the next step.
     * `distance`, `nearest` and `ramp` for the limits of the next step.
 
     A law derives from this class and defines `theta`, `start`, `touching`, `tractions`, `distance` and `part`. A law of
@@ -219,7 +219,7 @@ class ContactLaw:
         """
         raise NotImplementedError
 
-    def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
+    def one_sided_stiffness(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
         """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
 
         A point whose gap has just closed lies at the outer edge of the contact ramp, where the stiffness is 0. A law

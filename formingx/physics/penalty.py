@@ -275,7 +275,7 @@ class Law(NormalLaw):
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
-    def stiffness_ahead(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
+    def one_sided_stiffness(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
         """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
 
         A point whose gap just closed has the signed distance -theta, at which the contact ramp begins and the stiffness

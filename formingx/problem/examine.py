@@ -185,16 +185,16 @@ def _deformed_position(problem: Any, state: Any, point: np.ndarray) -> np.ndarra
 
 def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
     """Return the masks of the locally owned points in contact, shape (n,), for every active contact."""
-    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.present]
+    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.active_contacts]
 
 
 def _status_changes(problem: Any, attempt: Any) -> int | None:
     """Return the number of points whose contact status changed in the last iteration; None without contact."""
-    if not problem.present:
+    if not problem.active_contacts:
         return None
     n, count = problem.forms.space.dofmap.index_map.size_local, 0
     before = attempt.x - attempt.dx, attempt.control - attempt.dcontrol
-    for contact, a, b in zip(problem.present, _touching(problem, *before),
+    for contact, a, b in zip(problem.active_contacts, _touching(problem, *before),
                              _touching(problem, attempt.x, attempt.control), strict=True):
         slides = [contact.law.tractions(contact.positions(x[:n], c), contact.history).sense
                   for x, c in (before, (attempt.x, attempt.control))]

@@ -49,7 +49,7 @@ class Problem(Stages, Units):
         x: vector of unknowns; inside `state_context` the unknowns of the state.
         matrix: the tangent, reassembled by `tangent`.
         contacts: contacts of the scene (`FaceContact`).
-        present: contacts that are active in the present stage.
+        active_contacts: contacts that are active in the current stage.
         histories: history variables on which F depends (`History`): contacts, then materials, then the temperature.
         limit: contact's limits to the length of a step (`StepLimit`).
         admissible: admissibility check of the body, and its volume ratios (`Admissible`).
@@ -85,12 +85,12 @@ class Problem(Stages, Units):
 
     @property
     def has_kinks(self) -> bool:
-        return bool(self.present)
+        return bool(self.active_contacts)
 
     @property
     def active_set(self) -> Any:
-        status = tuple(c.increment.status.tobytes() for c in self.present)
-        return tuple(listed(self.comm, status)) if self.present else None
+        status = tuple(c.increment.status.tobytes() for c in self.active_contacts)
+        return tuple(listed(self.comm, status)) if self.active_contacts else None
 
     @property
     def temperature(self) -> Temperature | None:
@@ -202,7 +202,7 @@ class Problem(Stages, Units):
         forces are dimensionless, for the same unknowns, shape (n,).
         """
         values = self.assemble(self._residual)
-        for contact in self.present:
+        for contact in self.active_contacts:
             contact.add_residual(values, fields, control)
         return values
 
@@ -255,21 +255,22 @@ class Problem(Stages, Units):
         return self.admissible.inverted_elements()
 
     def begin(self, old: Any = None) -> None:
-        for contact in self.present:
+        for contact in self.active_contacts:
             contact.begin(*((None, 0.0) if old is None else (old.x[: self._n], old.control)))
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
         if self.contacts:
             values = F.array_r[: self._n].copy()
-            for contact in self.present:
+            for contact in self.active_contacts:
                 contact.linearise(values, x.array_r[: self._n], control)
             values[self.constrained] = F.array_r[: self._n][self.constrained]
             F.array_w[: self._n] = values
 
-    def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
+    def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> PETSc.Mat:
         self.set_state(x, control)
         fields = x.array_r[: self._n]
-        return self._tangent.matrix.fill([(c.rule.dofs, c.tangent(fields, control, ahead)) for c in self.present])
+        return self._tangent.matrix.fill([(c.rule.dofs, c.tangent(fields, control, one_sided))
+                                          for c in self.active_contacts])
 
     def viscosity(self) -> Viscosity:
         return Viscosity(self._viscosity, self._stage.active.bcs)
@@ -285,14 +286,14 @@ class Problem(Stages, Units):
     def _viscosity(self) -> Any:
         return self.forms.compile(self.forms.viscosity())
 
-    def changes_ahead(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
-        return [contact.change_ahead(x.array_r[: self._n], control) for contact in self.present]
+    def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
+        return [contact.one_sided_change(x.array_r[: self._n], control) for contact in self.active_contacts]
 
-    def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
+    def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, one_sided: bool = False) -> None:
         self.set_state(x, control)
         values = self._tangent.by_control(self.setting.rate, self.assemble, self._n)
-        for contact in self.present:
-            contact.add_control_derivative(values, x.array_r[: self._n], control, ahead)
+        for contact in self.active_contacts:
+            contact.add_control_derivative(values, x.array_r[: self._n], control, one_sided)
         values[self.constrained] = -self._stage.rate
         self.fill(out, values)
         if self._stage.unbalanced is not None:

@@ -48,14 +48,14 @@ class Stages(Vectors):
         scene: the `Scene`.
         x: vector of unknowns; inside `state_context` the unknowns of the state.
         contacts: contacts of the scene.
-        present: the active contacts.
+        active_contacts: the active contacts.
         matrix: the tangent.
     """
 
     scene: Scene
     x: PETSc.Vec
     contacts: list[FaceContact]
-    present: list[FaceContact]
+    active_contacts: list[FaceContact]
     _constraints: Constraints
     _stage: Any
 
@@ -64,7 +64,7 @@ class Stages(Vectors):
 
     @cached_property
     def _tangent(self) -> Tangent:
-        """Tangent matrix of the scene, with the constraints of the present stage."""
+        """Tangent matrix of the scene, with the constraints of the current stage."""
         made, stage = Tangent(self.forms, self._constraints, self.symmetric), self._stage
         made.enter(stage.active, stage.setting.rate, True)
         return made
@@ -81,7 +81,7 @@ class Stages(Vectors):
 
     @property
     def control(self) -> float:
-        """Present control of the forms; inside `state_context` the control of the state."""
+        """Current control of the forms; inside `state_context` the control of the state."""
         return float(self._control)
 
     @property
@@ -204,6 +204,6 @@ class Stages(Vectors):
         for contact in self.contacts:
             i = number[id(contact.contact)]
             contact.enter(setting.base[i], setting.rate[i], i not in setting.inactive)
-        self.present = [contact for contact in self.contacts if contact.present]
+        self.active_contacts = [contact for contact in self.contacts if contact.active]
         if "_tangent" in vars(self):
             self._tangent.enter(stage.active, setting.rate, before is None or before.active is not stage.active)

@@ -59,6 +59,8 @@ class BorderedTangent:
 class Columns:
     """Solutions of the bordered system for m right-hand sides, such as unit forces at contact points.
 
+    The bordered system is K dx = E for the tangent K, with the constraint of the step as a further row.
+
     Args:
         solver: solver with the factors of the tangent K.
         E: right-hand sides as columns, locally owned rows, shape (n, m).
@@ -73,39 +75,40 @@ class Columns:
         self.steps = border(self._values)
 
     def motions(self, moved: Moved) -> Array:
-        """Return the motions of contact points for each right-hand side, shape (k, m), length.
+        """Return the motions of contact points for each of the m right-hand sides, shape (k, m), length.
 
         Args:
-            moved: function that returns k motions for an update of unknowns and control (`Moved`).
+            moved: function that returns the k components of the motions for an update of unknowns and control
+                (`Moved`).
         """
         return np.asfortranarray(moved(self._values, self.steps))         # a column of each force in one piece
 
-    def update(self, forces: Array) -> tuple[Array, float]:
-        """Return the updates of unknowns and control for a linear combination of the right-hand sides.
+    def update(self, factors: Array) -> tuple[Array, float]:
+        """Return the updates of unknowns and control that a linear combination of the m right-hand sides gives.
 
         Args:
-            forces: factors of the right-hand sides, shape (m,).
+            factors: factors of the right-hand sides, shape (m,).
 
         Returns:
             Update of the unknowns, locally owned entries, shape (n,); update of the control.
         """
-        return self._values @ forces, float(self.steps @ forces)
+        return self._values @ factors, float(self.steps @ factors)
 
-    def updates(self, forces: Array) -> Array:
-        """Return the updates of the unknowns for k linear combinations of the right-hand sides, shape (n, k).
+    def updates(self, factors: Array) -> Array:
+        """Return the updates of the unknowns that k combinations of the m right-hand sides give, shape (n, k).
 
         Args:
-            forces: factors of the right-hand sides, a column for each combination, shape (m, k).
+            factors: factors of the right-hand sides, a column for each combination, shape (m, k).
         """
-        return self._values @ forces
+        return self._values @ factors
 
 
 class CondensedColumns:
-    """Solutions of the bordered system for right-hand sides that are zero in most rows, as in `Columns`.
+    """Solutions of the bordered system for right-hand sides that are zero in most rows; members as in `Columns`.
 
-    They are computed from a few entries of K^-1: those in the rows where a right-hand side is not zero. The motions of
-    contact points must depend on the unknowns of these rows and on the control alone. The changes of the control take
-    one solution with the transposed K. Each update of all unknowns takes one solution with K.
+    Only the entries of K^-1 in the nonzero rows of the right-hand sides are computed. They give the solutions in these
+    rows, and so the motions of contact points that depend on no other unknowns. One solution with the transposed K
+    gives the changes of the control for all right-hand sides. Each update of all unknowns takes one solution with K.
 
     Args:
         solver: solver with the factors of the tangent K.
@@ -127,40 +130,41 @@ class CondensedColumns:
         adjoint.destroy()
 
     def motions(self, moved: Moved) -> Array:
-        """Return the motions of contact points for each right-hand side, shape (k, m), length.
+        """Return the motions of contact points for each of the m right-hand sides, shape (k, m), length.
 
         Args:
-            moved: function that returns k motions for an update of unknowns and control (`Moved`).
+            moved: function that returns the k components of the motions for an update of unknowns and control
+                (`Moved`).
         """
         V = np.zeros((self._border.b.getLocalSize(), self._found.shape[1]))
         V[self._rows] = self._found
         return moved(V, np.zeros(V.shape[1])) + np.outer(moved(self._border.b.array_r, 1.0), self.steps)
 
-    def update(self, forces: Array) -> tuple[Array, float]:
-        """Return the updates of unknowns and control for a linear combination of the right-hand sides.
+    def update(self, factors: Array) -> tuple[Array, float]:
+        """Return the updates of unknowns and control that a linear combination of the m right-hand sides gives.
 
         Args:
-            forces: factors of the right-hand sides, shape (m,).
+            factors: factors of the right-hand sides, shape (m,).
 
         Returns:
             Update of the unknowns, locally owned entries, shape (n,); update of the control.
         """
-        rhs, out, step = self._border.b.duplicate(), self._border.b.duplicate(), float(self.steps @ forces)
+        rhs, out, step = self._border.b.duplicate(), self._border.b.duplicate(), float(self.steps @ factors)
         rhs.array_w[:] = 0.0
-        rhs.array_w[self._rows] = self._E @ forces
+        rhs.array_w[self._rows] = self._E @ factors
         self._solver.solve(rhs, out)
         dx = out.array_r + step * self._border.b.array_r
         rhs.destroy()
         out.destroy()
         return dx, step
 
-    def updates(self, forces: Array) -> Array:
-        """Return the updates of the unknowns for k linear combinations of the right-hand sides, shape (n, k).
+    def updates(self, factors: Array) -> Array:
+        """Return the updates of the unknowns that k combinations of the m right-hand sides give, shape (n, k).
 
         Args:
-            forces: factors of the right-hand sides, a column for each combination, shape (m, k).
+            factors: factors of the right-hand sides, a column for each combination, shape (m, k).
         """
-        return np.array([self.update(column)[0] for column in forces.T]).T
+        return np.array([self.update(column)[0] for column in factors.T]).T
 
 
 def columns(solver: DirectSolver, E: Array, border: Border) -> Columns | CondensedColumns:
@@ -175,7 +179,8 @@ def columns(solver: DirectSolver, E: Array, border: Border) -> Columns | Condens
     Returns:
         The solutions.
     """
-    if isinstance(border, BorderedTangent) and len(E) >= CONDENSATION.rows and E.shape[1] >= CONDENSATION.columns:
+    worthwhile = len(E) >= CONDENSATION.min_rows and E.shape[1] >= CONDENSATION.min_columns
+    if isinstance(border, BorderedTangent) and worthwhile:
         rows = np.flatnonzero(E.any(axis=1))
         inverse = solver.inverse(rows)
         if inverse is not None:

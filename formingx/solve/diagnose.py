@@ -23,25 +23,25 @@ class Limits:
     """Limits of numbers of the last good state, beyond which they indicate a cause of the failure.
 
     Attributes:
-        before: number of states between the last good state and the earlier state with which its condition number is
-            compared.
-        singular: ratio of both condition numbers above which the tangent counts as singular.
-        round_off: condition number above which hardly any of 16 digits is correct.
-        slowing: derivative of the control with respect to arc length, over the largest such derivative on the path,
+        states_before: number of states between the last good state and the earlier state with which its condition
+            number is compared.
+        singular_ratio: ratio of both condition numbers above which the tangent counts as singular.
+        round_off_condition: condition number above which hardly any of 16 digits is correct.
+        slope_ratio: derivative of the control with respect to arc length, over the largest such derivative on the path,
             below which a limit point ahead is extrapolated.
-        material: ratio of I1 - 3 to its limit in the material, above which the material counts as a cause.
-        volume: volume ratio J below which an element is about to turn inside out.
-        shape: shape quality of a deformed element, over its value in the reference configuration, below which the
-            element is about to turn inside out.
+        material_ratio: ratio of I1 - 3 to its limit in the material, above which the material counts as a cause.
+        min_volume_ratio: volume ratio J below which an element is about to turn inside out.
+        min_quality_ratio: shape quality of a deformed element, over its value in the reference configuration, below
+            which the element is about to turn inside out.
     """
 
-    before: int = 10
-    singular: float = 100.0
-    round_off: float = 1e14
-    slowing: float = 0.3
-    material: float = 0.8
-    volume: float = 0.3
-    shape: float = 0.1
+    states_before: int = 10
+    singular_ratio: float = 100.0
+    round_off_condition: float = 1e14
+    slope_ratio: float = 0.3
+    material_ratio: float = 0.8
+    min_volume_ratio: float = 0.3
+    min_quality_ratio: float = 0.1
 
 
 _LIMITS = Limits()
@@ -92,8 +92,8 @@ class Diagnosis:
         turned: pairs of values of the controlled quantity, in the user's units, between which the determinant of the
             tangent changed its sign without a limit point.
         limit_points: values of the controlled quantity at the limit points of the path, in the user's units.
-        limit_ahead: value of the controlled quantity at a limit point ahead, extrapolated from the slopes of the last
-            states; None without one.
+        next_limit_point: value of the controlled quantity at a limit point ahead, extrapolated from the slopes of the
+            last states; None without one.
         flipped: number of nodes whose contact status (open, sticking, sliding) changed in the last iteration of the
             failed attempt.
         touching: number of nodes in contact in the last good state.
@@ -120,7 +120,7 @@ class Diagnosis:
     limit: Place | None = None
     turned: tuple[tuple[float, float], ...] = ()
     limit_points: tuple[float, ...] = ()
-    limit_ahead: float | None = None
+    next_limit_point: float | None = None
     flipped: int | None = None
     touching: int = 0
     condition: float | None = None
@@ -263,7 +263,7 @@ def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     usable = [s for s in states[1 if problem.singular_unloaded else 0:] if s.kind != "limit point"]
     if sign(states[-1]):
         facts["condition"] = condition(problem.matrix, solver)
-    if len(usable) > _LIMITS.before and sign(usable[-1 - _LIMITS.before]):
+    if len(usable) > _LIMITS.states_before and sign(usable[-1 - _LIMITS.states_before]):
         facts["condition_before"] = condition(problem.matrix, solver)
     turned = branches(curve, states, sign)
     facts["turned"] = tuple((problem.shown(a.control)[1], problem.shown(b.control)[1]) for a, b in turned)
@@ -272,9 +272,9 @@ def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
         a, b = states[-2:]
         slopes = [curve.unit_slope(s) for s in states]
         drop = slopes[-2]**2 - slopes[-1]**2              # slope^2 is proportional to the distance to the limit
-        if drop > 0 and slopes[-2] * slopes[-1] > 0 and abs(slopes[-1]) < _LIMITS.slowing * max(map(abs, slopes)):
+        if drop > 0 and slopes[-2] * slopes[-1] > 0 and abs(slopes[-1]) < _LIMITS.slope_ratio * max(map(abs, slopes)):
             ahead = b.control + (b.control - a.control) * slopes[-1]**2 / drop
-            facts["limit_ahead"] = problem.shown(ahead)[1]
+            facts["next_limit_point"] = problem.shown(ahead)[1]
     return facts
 
 
@@ -282,7 +282,7 @@ def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
 def _material_findings(run: FailedRun) -> Iterator[Finding]:
     """Yield a finding if I1 at a point of the body is near the limit of its material (Gent, Arruda-Boyce)."""
     facts = run.facts
-    if (facts.get("I1") or 0) > _LIMITS.material:
+    if (facts.get("I1") or 0) > _LIMITS.material_ratio:
         yield Finding("serious", "material",
                       f"a material is stretched nearly to its limit: I1 - 3 is {100 * facts['I1']:.3g} % of the largest"
                       f" that it allows, at {facts['limit']}",
@@ -297,8 +297,9 @@ def _element_findings(run: FailedRun) -> Iterator[Finding]:
     J, failed_J = facts.get("smallest_J"), facts.get("failed_J")
     infinite = any(np.isinf(v) for v in facts.get("residual", {}).values())
     inverted = failed_J is not None and failed_J <= 0
-    if J is not None and (_LIMITS.volume > J or facts["shape"] < _LIMITS.shape and (inverted or infinite)):
-        now = f"J = {J:.3g}" if _LIMITS.volume > J else f"its shape quality is {facts['shape']:.2g} times that at rest"
+    small = J is not None and _LIMITS.min_volume_ratio > J
+    if J is not None and (small or facts["shape"] < _LIMITS.min_quality_ratio and (inverted or infinite)):
+        now = f"J = {J:.3g}" if small else f"its shape quality is {facts['shape']:.2g} times that at rest"
         R, Z = facts["at_J"].R, facts["at_J"].Z
         yield Finding("serious", "element",
                       f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
@@ -345,7 +346,7 @@ def _limit_point_findings(run: FailedRun) -> Iterator[Finding]:
                       f"the {what} has its {extremum}, {max(limits, key=abs):.6g}, at a limit point that was passed,"
                       f" and the target {target:.6g} lies {side} it",
                       "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
-    ahead, aimed = facts.get("limit_ahead"), facts.get("aimed")
+    ahead, aimed = facts.get("next_limit_point"), facts.get("aimed")
     if ahead is not None and run.fixed_control:
         yield Finding("warning", "limit point",
                       f"a limit point lies ahead: extrapolated from the last states, the {what} rises to about"
@@ -363,11 +364,12 @@ def _branch_findings(run: FailedRun) -> Iterator[Finding]:
                       f"the tangent stiffness became indefinite between {what} {a:.6g} and {b:.6g} without a limit"
                       f" point: another path branches off there (a bifurcation, such as buckling)",
                       f"a small imperfection in the load or the mesh, or a target before {what} {b:.6g}")
-    at_limit_point = facts.get("limit_ahead") is not None or facts.get("control") in facts.get("limit_points", ())
+    at_limit_point = facts.get("next_limit_point") is not None or facts.get("control") in facts.get("limit_points", ())
     if _singular(facts) and not facts.get("turned") and not at_limit_point:
         yield Finding("warning", "tangent",
                       "the tangent stiffness becomes singular, and there is no limit point: its condition number has"
-                      f" grown from {facts['condition_before']:.1g} to {facts['condition']:.1g} in {_LIMITS.before}"
+                      f" grown from {facts['condition_before']:.1g} to {facts['condition']:.1g} in"
+                      f" {_LIMITS.states_before}"
                       f" states; the body buckles here, or a contact point is about to slip off its tool",
                       "smaller elements; Contact(..., points=4), where there is contact")
     if facts.get("flipped"):
@@ -379,18 +381,18 @@ def _branch_findings(run: FailedRun) -> Iterator[Finding]:
 
 
 def _singular(facts: dict[str, Any]) -> bool:
-    """Return True if the condition number of the tangent has grown by the factor `Limits.singular` over the last
+    """Return True if the condition number of the tangent has grown by the factor `Limits.singular_ratio` over the last
     states.
     """
     before = facts.get("condition_before")
-    return bool(before and (facts.get("condition") or 0) > _LIMITS.singular * before)
+    return bool(before and (facts.get("condition") or 0) > _LIMITS.singular_ratio * before)
 
 
 @register("failure")
 def _round_off_findings(run: FailedRun) -> Iterator[Finding]:
     """Yield a finding if the condition number of the tangent leaves hardly any correct digits."""
     facts = run.facts
-    if (facts.get("condition") or 0) > _LIMITS.round_off and not _singular(facts):
+    if (facts.get("condition") or 0) > _LIMITS.round_off_condition and not _singular(facts):
         yield Finding("warning", "round-off",
                       f"round-off: the condition number of the tangent stiffness is {facts['condition']:.1g}, and"
                       f" hardly any of 16 digits are left",

@@ -11,7 +11,7 @@ result. In each step the solver calls these methods, in this order:
     tangent, control_derivative         Compute dF/dx and dF/dcontrol, at the (x, control) of the residual.
     has_inverted_element, limit.check, step_error   Check the converged state.
     advance                             Accept the state and update the history variables.
-    tangent(ahead=True)                 Compute the tangent of the next step, which differs if F has a kink.
+    tangent(one_sided=True)             Compute the tangent of the next step, which differs if F has a kink.
 
 `state_context` and `restore` return to an earlier state. `enter` changes the step data between the stages of a process.
 The defaults in this module suit equations without contact, history, time or units. A class derived from `Equations`
@@ -23,18 +23,17 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import AbstractContextManager
 from os import PathLike
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..contact.step_limit import StepLimit
 from ..forms.history import ConstitutiveHistory
 from ..forms.schedule import StepData
-
-Array: TypeAlias = npt.NDArray[Any]
+from .contact_faces import Array as Array
+from .contact_faces import ContactFace
 
 Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
 """Function (x, control, gradient) -> (c, dc/dcontrol) of a constraint c = 0; it sets the vector `gradient` to dc/dx."""
@@ -50,7 +49,10 @@ class Quantity(Protocol):
     size: float
 
     def value(self, x: PETSc.Vec, control: float) -> float:
-        """Return the value of the quantity at (x, control), in the user's units."""
+        """Return the value of the quantity in the user's units.
+
+        x: unknowns of the state. control: load parameter (control) of the state, dimensionless.
+        """
 
     def equation(self, target: float) -> Constraint:
         """Return the constraint "quantity = target"; `target` is in the user's units."""
@@ -74,104 +76,17 @@ class ProblemState(Protocol):
     setting: dict[str, Any]
 
 
-class Tractions(Protocol):
-    """Tractions of the contact law at n points with c components.
-
-    Attributes:
-        force: tractions, shape (n, c), stress.
-        sense: direction of sliding along the tangent of the tool, 1 or -1; 0 for other points; shape (n,).
-        stiffness: derivative of `force` with respect to the position of its point, shape (n, c, c), stress/length.
-        status: `ContactStatus` of each point, shape (n,).
-    """
-
-    force: Array
-    sense: Array
-
-    @property
-    def stiffness(self) -> Array: ...
-
-    @property
-    def status(self) -> Array: ...
-
-
-class Increment(Protocol):
-    """Contact law at n locally owned points of a face with c components, linearised in each Newton iteration."""
-
-    @property
-    def ramp(self) -> float:
-        """Half-width of the ramp, the range of gaps in which the contact stiffness grows from zero, length."""
-
-    @property
-    def status(self) -> Array:
-        """`ContactStatus` of each point in the last linearisation, shape (n,)."""
-
-    @property
-    def newly_closed(self) -> Array:
-        """Mask of points that are closed now but were open at the start of Newton's method, shape (n,)."""
-
-    def last_tractions(self, points: Array) -> tuple[Array, Array]:
-        """Return (tractions, stiffnesses) of m points in the last linearisation, shapes (m, c) and (m, c, c).
-
-        points: numbers of the points. Tractions are stresses, stiffnesses stress/length.
-        """
-
-    def predicted(self, motion: Array) -> Tractions:
-        """Return the tractions at all points after a motion relative to their tool, shape (n, c), length."""
-
-    def law_at(self, points: Array) -> Callable[[Array], Tractions]:
-        """Return a function that maps motions of m points relative to their tool, shape (m, c), length, to tractions.
-        """
-
-    def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Return a function that maps motions of m points, shape (m, c), length, to (depth, path) in the ramp.
-
-        The depth is divided by the width of the ramp, shape (m,). The path is the vector through the ramp, shape (m,
-        c), length; 0 for points that slide, adhere or have no friction.
-        """
-
-    def expect(self, points: Array, sense: Array) -> None:
-        """Set the direction of sliding, `sense`, shape (n,), that the next iteration assumes at a mask of points."""
-
-
-class ContactFace(Protocol):
-    """Face of the body in contact, with n locally owned points.
-
-    Attributes:
-        points: reference positions of the contact points, shape (n, c).
-        rule: quadrature rule of the face (`formingx.contact.rule.Rule`).
-    """
-
-    points: Array
-    rule: Any
-
-    @property
-    def increment(self) -> Increment:
-        """Contact law in the present run of Newton's method, which `ActiveSet.begin` creates."""
-
-    @property
-    def scale(self) -> Array:
-        """Factor from the traction of each point to its forces in F, shape (n,), 1/stress."""
-
-    def apply(self, forces: Array | None) -> None:
-        """Set contact forces that act in F in place of the contact law, shape (n, c); None: the law acts."""
-
-    def relative_motion(self, dx: Array, step: Array | float) -> Array:
-        """Return the motion of the points relative to their tool, shape (points, c), length, in an update.
-
-        dx: update of the unknowns, locally owned entries; several are columns. step: update of the control.
-        """
-
-
 class Viscosity(Protocol):
-    """Viscous forces eta V dx of a body: V is the matrix of a viscous stress, eta its viscosity, dx a motion."""
+    """Viscous forces eta V dx of a body: V is the matrix of a viscous stress with viscosity 1, eta the viscosity."""
 
     def forces(self, change: Array, eta: float) -> Array:
-        """Return the viscous forces eta V dx for a change dx of the unknowns, locally owned entries, shape (n,).
+        """Return the viscous forces eta V dx, locally owned entries, shape (n,).
 
-        V: matrix of the viscous stress. eta: its viscosity."""
+        change: change dx of the unknowns, shape (n,). eta: viscosity, dimensionless. V: matrix of the body.
+        """
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
-        """Add eta V, with the viscosity eta, to a tangent matrix in place."""
+        """Add eta V to a tangent matrix in place, with the matrix V of the body and the viscosity eta."""
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
@@ -233,17 +148,20 @@ class Residual(Protocol):
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         """Compute F(x, control) in `out`, and set `force_scale`."""
 
-    def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> PETSc.Mat:
+    def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> PETSc.Mat:
         """Compute dF/dx in `matrix`, and return this matrix.
 
         Args:
             x: unknowns at which the derivative is taken.
             control: control at which it is taken.
-            ahead: True for the one-sided derivative towards the next step, where F has a kink at an accepted state.
+            one_sided: True for the one-sided derivative towards the next step, where F has a kink at an accepted state.
         """
 
-    def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, ahead: bool = False) -> None:
-        """Compute dF/dcontrol at (x, control) in `out`; `ahead`: as in `tangent`."""
+    def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, one_sided: bool = False) -> None:
+        """Compute dF/dcontrol, the derivative of the residual F at (x, control), in `out`.
+
+        one_sided: True for the derivative towards the next step, where F has a kink at an accepted state.
+        """
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
         """Return the inner product of two changes a and b of x, from which arc length is computed; dimensionless.
@@ -275,7 +193,7 @@ class Residual(Protocol):
 
 
 class ActiveSet(Protocol):
-    """Contact of the body: F has a kink where points close, open, stick or slide (a change of the active set)."""
+    """Contact of the body: the residual F has a kink where points close, open, begin to stick or begin to slide."""
 
     @property
     def has_kinks(self) -> bool:
@@ -283,8 +201,8 @@ class ActiveSet(Protocol):
         return False
 
     @property
-    def present(self) -> Sequence[ContactFace]:
-        """Faces in contact that are active in the present stage."""
+    def active_contacts(self) -> Sequence[ContactFace]:
+        """Faces in contact that are active in the current stage."""
         return []
 
     @property
@@ -307,13 +225,16 @@ class ActiveSet(Protocol):
         """
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
-        """Linearise the contact law for an iteration, and change F, the residual at (x, control), to it in place."""
+        """Linearise the contact law for an iteration at (x, control).
 
-    def changes_ahead(self, x: PETSc.Vec, control: float) -> list[Array]:
+        F: residual there; its contact forces are replaced by the forces of the linearised law, in place.
+        """
+
+    def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[Array]:
         """Return for each face the change of contact stiffness per area at an accepted state (x, control).
 
-        It is the stiffness in the tangent `ahead` less the stiffness in the last tangent, shape (n, c, c),
-        stress/length.
+        It is the stiffness in the derivative towards the next step, minus the stiffness in the tangent of the last
+        iteration, for n points with c components, shape (n, c, c), stress/length.
         """
         return []
 
@@ -331,7 +252,7 @@ class Histories(Protocol):
 
     @property
     def has_history(self) -> bool:
-        """True if F depends on earlier states, by a material, the temperature or friction."""
+        """True if the residual F depends on earlier states, by a material, the temperature or friction."""
         return False
 
     @property
@@ -367,7 +288,8 @@ class Histories(Protocol):
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            Relative error at the end of the step; part of it that persists after another step of this length.
+            Relative error of the stress at the end of the step; the part of it that is left after relaxation at
+            constant deformation for a time of the same length as the step.
         """
         return 0.0, 0.0
 
@@ -377,7 +299,7 @@ class Stages(Protocol):
 
     @property
     def setting(self) -> StepData:
-        """Present step data: amplitudes as functions of the control, and inactive items."""
+        """Current step data: amplitudes as functions of the control, and inactive items."""
 
     def enter(self, setting: StepData, x: Array, control: float) -> None:
         """Set new step data, for a path that begins at (x, control); x: locally owned entries, shape (n,).

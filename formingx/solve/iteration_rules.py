@@ -14,39 +14,39 @@ class Newton:
     """Settings of Newton's method besides the convergence criteria (`newton.Tolerances`).
 
     Attributes:
-        unloaded: number that is added to the norm of the support forces in the relative residual, dimensionless.
-        at_rest: number that is added to the norm of the displacements in the relative correction, dimensionless. On a
-            tool whose force grows as the square of the penetration, corrections near the reference configuration are
-            as large as displacements.
-        hurried: largest number of iterations while the active set changes, in place of `Tolerances.settling`. It holds
-            for contact with history variables in a step that is repeated with a smaller length if it fails.
-        small: size of a correction (dimensionless displacement) below which growing corrections are no sign of
-            divergence while the active set changes.
-        exempt: number of iterations that do not count in `newton.Tolerances.settling`, of those whose small correction
-            led to a new active set. For example, a hundred points of a slack sheet separate one by one from a flat
-            plug. With history variables all iterations count.
-        cycles: number of returns to an earlier active set at which the iteration counts as cycling. Converged
+        force_floor: number that is added to the norm of the support forces in the relative residual, dimensionless.
+        displacement_floor: number that is added to the norm of the displacements in the relative correction,
+            dimensionless. On a tool whose force grows as the square of the penetration, corrections near the reference
+            configuration are as large as displacements.
+        history_settling: largest number of iterations while the active set changes, in place of `Tolerances.settling`.
+            It holds for contact with history variables in a step that is repeated with a smaller length if it fails.
+        small_correction: size of a correction (dimensionless displacement) below which growing corrections are no sign
+            of divergence while the active set changes.
+        exempt_iterations: number of iterations that do not count in `newton.Tolerances.settling`, of those whose small
+            correction led to a new active set. For example, a hundred points of a slack sheet separate one by one from
+            a flat plug. With history variables all iterations count.
+        max_cycles: number of returns to an earlier active set at which the iteration counts as cycling. Converged
             iterations took up to 4.
-        diverged: relative correction above which three corrections in a row mean divergence, with contact or without.
-            In converged iterations they stayed below 0.1.
-        left_alone: index of the iteration, counted from 0, in which the local contact problem is never solved. The
-            full correction often removes the errors of the iteration before it.
-        chords: number of chord iterations that together cost less than one iteration with a new tangent. A chord
+        divergence_correction: relative correction above which three corrections in a row mean divergence, with contact
+            or without. In converged iterations they stayed below 0.1.
+        uncorrected_iteration: index of the iteration, counted from 0, in which the local contact problem is never
+            solved. The full correction often removes the errors of the iteration before it.
+        max_chords: number of chord iterations that together cost less than one iteration with a new tangent. A chord
             iteration takes a residual and a solve, about a sixth of the time.
-        slow: ratio of the residuals after and before an iteration, above which a tangent is not kept. Round-off could
-            be mistaken for slower convergence.
+        max_residual_ratio: ratio of the residuals after and before an iteration, above which a tangent is not kept.
+            Round-off could be mistaken for slower convergence.
     """
 
-    unloaded: float = 1e-5
-    at_rest: float = 1e-2
-    hurried: int = 16
-    small: float = 1e-3
-    exempt: int = 160
-    cycles: int = 8
-    diverged: float = 0.3
-    left_alone: int = 1
-    chords: int = 3
-    slow: float = 0.1
+    force_floor: float = 1e-5
+    displacement_floor: float = 1e-2
+    history_settling: int = 16
+    small_correction: float = 1e-3
+    exempt_iterations: int = 160
+    max_cycles: int = 8
+    divergence_correction: float = 0.3
+    uncorrected_iteration: int = 1
+    max_chords: int = 3
+    max_residual_ratio: float = 0.1
 
 
 class ActiveSetChanges:
@@ -54,13 +54,13 @@ class ActiveSetChanges:
 
     Args:
         problem: the equations.
-        small: size below which a correction counts as small (`Newton.small`).
+        small: size below which a correction counts as small (`Newton.small_correction`).
 
     Attributes:
         changed: number of the iteration in which the active set changed last, counted from 0.
         share: factor of the next correction, halved (to 1/4 at least) when an earlier active set returns, as full
             corrections would cycle.
-        found: number of small corrections that led to a new active set, for `Newton.exempt`.
+        found: number of small corrections that led to a new active set, for `Newton.exempt_iterations`.
         returns: number of returns to an earlier active set.
     """
 
@@ -122,7 +122,7 @@ class ModifiedNewton:
         """Begin a run of Newton's method.
 
         Args:
-            setting: present step data. A tangent with other step data is not kept.
+            setting: current step data. A tangent with other step data is not kept.
             allowed: True if earlier tangents may be used in this step.
         """
         self._allowed, self._first = allowed, True
@@ -132,14 +132,14 @@ class ModifiedNewton:
         """Return True if the next iteration should be a chord iteration with the last tangent.
 
         Args:
-            residual: present relative residual.
+            residual: current relative residual.
             requested: tolerance of the relative residual.
 
         Returns:
-            True if `Newton.chords` chord iterations are expected to reach the tolerance.
+            True if `Newton.max_chords` chord iterations are expected to reach the tolerance.
         """
-        ahead = residual * self._fall**self._settings.chords
-        return self._allowed and self._fall < self._settings.slow and ahead < requested
+        ahead = residual * self._fall**self._settings.max_chords
+        return self._allowed and self._fall < self._settings.max_residual_ratio and ahead < requested
 
     def note_iteration(self, chord: bool, fall: float) -> None:
         """Note the convergence of an iteration.

@@ -32,7 +32,7 @@ class JumpRules:
 
     def __init__(self, curve: Curve, targets: RunTargets, settings: SnapThrough, rule: str = ""):
         self._curve, self._problem, self._targets, self._settings = curve, curve.problem, targets, settings
-        self.rule, self.change, self.no_equilibrium_at = rule, settings.ahead, np.nan
+        self.rule, self.change, self.no_equilibrium_at = rule, settings.control_change, np.nan
 
     @property
     def allowed(self) -> bool:
@@ -53,7 +53,7 @@ class JumpRules:
 
     def found_no_equilibrium_near(self, old: State) -> bool:
         """Return True if an earlier snap-through, at nearly the control of `old`, reached no equilibrium."""
-        return abs(old.control - self.no_equilibrium_at) < self._settings.furthest
+        return abs(old.control - self.no_equilibrium_at) < self._settings.max_control_change
 
     def jump(self, old: State, length: float, sense: float, passed: Sequence[State], listener: Callable[[], None],
              work_sign: float = 0.0) -> State:
@@ -77,12 +77,12 @@ class JumpRules:
             Failure: no such state was found.
         """
         fading, settings = self._problem.setting.fading, self._settings
-        others = (settings.ahead, settings.furthest) if (
+        others = (settings.control_change, settings.max_control_change) if (
             length == 0 and self._problem.has_history and not fading) else ()
         failure: Failure | None = None
         for next_change in dict.fromkeys((self.change, *others)):
             self.change = next_change
-            solutions = settings.solutions // 5 if self.found_no_equilibrium_near(old) else settings.solutions
+            solutions = settings.max_solutions // 5 if self.found_no_equilibrium_near(old) else settings.max_solutions
             change = sense * max(self.change, length * abs(old.slope))
             change = 1 - old.control if fading else self._targets.short_of_targets(old, change)
             try:
@@ -93,7 +93,7 @@ class JumpRules:
                 if isinstance(last, NoEquilibrium):
                     self.no_equilibrium_at = old.control
             else:
-                self.change = min(10 * self.change, settings.furthest)
+                self.change = min(10 * self.change, settings.max_control_change)
                 return new
         assert failure is not None
         raise failure
@@ -139,4 +139,4 @@ def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
     if at_limit_point not in ("snap_through",
                               "continue_volume") or old.kind != "limit point" and old.slope * sense >= 0:
         return False
-    return at_limit_point == "snap_through" or curve.work_ahead(old) * sense < 0
+    return at_limit_point == "snap_through" or curve.work_rate(old) * sense < 0

@@ -26,14 +26,14 @@ class Condensation:
     """Smallest sizes of a linear system for which the zeros of its right-hand sides save time in MUMPS.
 
     Attributes:
-        columns: number of right-hand sides from which a few entries of the inverse matrix cost less than full solutions
-            (`CondensedColumns`).
-        rows: number of unknowns from which entries of the inverse are used. Right-hand sides are given to MUMPS as
+        min_columns: number of right-hand sides from which a few entries of the inverse matrix cost less than full
+            solutions (`CondensedColumns`).
+        min_rows: number of unknowns from which entries of the inverse are used. Right-hand sides are given to MUMPS as
             sparse columns if there are at least this many unknowns for each nonzero entry.
     """
 
-    columns: int = 12
-    rows: int = 10_000
+    min_columns: int = 12
+    min_rows: int = 10_000
 
 
 CONDENSATION = Condensation()
@@ -55,7 +55,7 @@ class DirectSolver:
     """Direct solver by MUMPS: factorise a matrix once, then solve for many right-hand sides.
 
     Args:
-        matrix: the matrix; `factorise` uses its present entries.
+        matrix: the matrix; `factorise` uses its current entries.
         symmetric: True for LDL^T factors, False for LU factors.
         determinant: compute the determinant with each factorisation (`sign`).
         inertia: count the negative pivots with each factorisation (`negative_pivots`).
@@ -73,7 +73,7 @@ class DirectSolver:
         self._create()
 
     def factorise(self, rescale: bool = True) -> bool:
-        """Factorise the matrix with its present entries.
+        """Factorise the matrix with its current entries.
 
         Args:
             rescale: False keeps the scaling of rows and columns from the last factorisation, if there was one. A new
@@ -184,7 +184,7 @@ class DirectSolver:
 
     def _sparse(self, rhs: Array) -> PETSc.Mat | None:
         """Return right-hand sides, shape (n, m), as a sparse matrix; None if MUMPS gains nothing by their zeros."""
-        (n, m), rows = rhs.shape, CONDENSATION.rows
+        (n, m), rows = rhs.shape, CONDENSATION.min_rows
         if rows > n * m or self._matrix.comm.size > 1 or rows * np.count_nonzero(rhs[:, 0]) > n:
             return None
         column, row = np.nonzero(rhs.T)
@@ -197,7 +197,7 @@ class DirectSolver:
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
         """Return two dense matrices, for right-hand sides and solutions, with n locally owned rows and m columns.
 
-        The matrices of one and of two columns, and those of the last other width, are used again.
+        Both are kept for the next call with the same m. Of numbers of columns above 2, only the last one is kept.
         """
         if m not in self._columns:
             for other in [width for width in self._columns if width > 2]:

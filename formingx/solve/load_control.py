@@ -69,7 +69,7 @@ class FixedControl:
         self._snes.destroy()
 
     def _function(self, snes: PETSc.SNES, x: PETSc.Vec, out: PETSc.Vec) -> None:
-        """Compute the residual F at x and the present control in `out`, as SNES calls it."""
+        """Compute the residual F at x and the current control in `out`, as SNES calls it."""
         self._problem.residual(x, self._control, out)
 
     def _jacobian(self, snes: PETSc.SNES, x: PETSc.Vec, A: PETSc.Mat, P: PETSc.Mat) -> None:

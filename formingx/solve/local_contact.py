@@ -24,7 +24,8 @@ from petsc4py import PETSc
 
 from ..ranks import combined, gathered, listed
 from .compliance import Border, columns
-from .equations import Array, ContactFace, Equations
+from .contact_faces import ContactFace
+from .equations import Array, Equations
 from .linear import DirectSolver
 
 
@@ -35,26 +36,26 @@ class LocalContact:
     The ramp is the range of gaps in which the contact stiffness grows from zero.
 
     Attributes:
-        most_points: largest number of points in a local solve; with more points Newton's method continues without it.
-        few_changes: number of changed points up to which Woodbury's formula costs less than another factorisation.
-        iterations: largest number of iterations of the local solve.
-        full_corrections: number of full corrections, which may cycle. Later corrections of sticking points stop near
-            the outer edge of the ramp. Where a point slides, corrections are halved that increase the residual.
-        most_halvings: largest number of halvings of a correction, which would stall at a kink.
+        max_points: largest number of points in a local solve; with more points Newton's method continues without it.
+        max_changes: number of changed points up to which Woodbury's formula costs less than another factorisation.
+        max_iterations: largest number of iterations of the local solve.
+        full_corrections: number of full corrections at the start, which may cycle. In later corrections sticking points
+            stop near the outer edge of the ramp. If a point slides, a correction that increases the residual is halved.
+        max_halvings: largest number of halvings of a correction, which would stall at a kink.
         kept_depth: if a correction would move a point out of the ramp, the point stops at this fraction of its depth.
-        least_depth: depth in the ramp, over its width, below which a point may leave the ramp.
+        min_depth: depth in the ramp, over its width, below which a point may leave the ramp.
         entry_depth: depth in the ramp, over its width, at which a point stops when it enters the ramp again.
         entry_growth: factor of `entry_depth` from one entry to the next.
         accuracy: tolerance of the motions of the points, over the half-width of the ramp.
     """
 
-    most_points: int = 40
-    few_changes: int = 3
-    iterations: int = 40
+    max_points: int = 40
+    max_changes: int = 3
+    max_iterations: int = 40
     full_corrections: int = 8
-    most_halvings: int = 4
+    max_halvings: int = 4
     kept_depth: float = 0.1
-    least_depth: float = 1e-9
+    min_depth: float = 1e-9
     entry_depth: float = 1e-6
     entry_growth: float = 10.0
     accuracy: float = 1e-4
@@ -74,7 +75,7 @@ class LocalSolve:
     """
 
     def __init__(self, problem: Equations):
-        self._problem, self._contacts = problem, problem.present
+        self._problem, self._contacts = problem, problem.active_contacts
         self._marked: list[Array] = []
         self._status: list[Array] = []
         self.failed = 0
@@ -107,7 +108,7 @@ class LocalSolve:
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]
             points = combined(self._problem.comm, sum(map(len, chosen)), MPI.SUM)
-            if not 0 < points <= _LOCAL.most_points:
+            if not 0 < points <= _LOCAL.max_points:
                 return step
             small = _Points(self._problem, self._contacts, chosen, solver, border)
             change = small.solve(dx, step)
@@ -121,10 +122,10 @@ class LocalSolve:
         return step + step_correction
 
     def _mark_further(self, dx: Array, step: float) -> bool:
-        """Mark further points whose status changes in a Newton update; return True if a rank has such points.
+        """Mark the points whose status would change in a Newton update; return True if a rank has new ones.
 
-        The sense of sliding that the next linearisation assumes at marked points is set, too. dx: update of x, locally
-        owned entries, shape (n,). step: update of the control.
+        Marked points take part in the local solve. The sense of sliding that the next linearisation assumes at them is
+        set, too. dx: update of x, locally owned entries, shape (n,). step: update of the control.
         """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
@@ -150,22 +151,22 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
         solver: solver with the LU factors of the tangent.
 
     Returns:
-        The function (`Update`). None if more points change than `LocalContact.few_changes`: another factorisation then
+        The function (`Update`). None if more points change than `LocalContact.max_changes`: another factorisation then
         costs less.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = combined(problem.comm, sum(map(len, chosen)), MPI.SUM)
-    if points > _LOCAL.few_changes:
+    if points > _LOCAL.max_changes:
         return None
     if not points:
         return lambda V, step: V
-    small = _Points(problem, problem.present, chosen, solver, lambda V: np.zeros(V.shape[1]))
+    small = _Points(problem, problem.active_contacts, chosen, solver, lambda V: np.zeros(V.shape[1]))
     stiffer = [change[i] for change, i in zip(changes, chosen)]
     return lambda V, step: small.updated(V, step, stiffer)
 
 
 def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array]) -> Array:
-    """Return the contributions to F of unit forces at contact points, a column for each component of each point.
+    """Return the contributions to the residual F of unit forces at contact points, for each component of each point.
 
     Args:
         problem: the equations.
@@ -173,8 +174,8 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
         chosen: for each face, local numbers of owned points.
 
     Returns:
-        Locally owned rows, shape (n, m), 0 at constrained unknowns. The m columns run over ranks, points and
-        components.
+        Locally owned rows, a column for each force, shape (n, m), 0 at constrained unknowns. The m columns are ordered
+        by rank, face, point and component.
     """
     comm, components = problem.comm, contacts[0].points.shape[1]
     counts = listed(comm, [len(points) * components for points in chosen])
@@ -217,7 +218,7 @@ class _Points:
         self._C = self._gather(self._columns.motions(self._moved)) * self._scale
 
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
-        """Solve the contact law at the points, together with their compliance, for a Newton update.
+        """Solve for motions of the points that satisfy the contact law and the compliance of the body at them.
 
         Args:
             dx: Newton update of x.
@@ -232,7 +233,7 @@ class _Points:
         y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
         accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
-        for k in range(_LOCAL.iterations):
+        for k in range(_LOCAL.max_iterations):
             f, S = self._law(laws, y)
             added = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
             R = y - y0 + self._C @ added
@@ -250,7 +251,7 @@ class _Points:
             if k >= _LOCAL.full_corrections:
                 ramps = ramps or [c.increment.in_ramp(i) for c, i in self._some]
                 new, keep = self._stop_at_edge(ramps, y, new, entry_depth)
-                halvings = 0 if keep else _LOCAL.most_halvings
+                halvings = 0 if keep else _LOCAL.max_halvings
             y, dy = new, new - y
         return None
 
@@ -258,23 +259,23 @@ class _Points:
         """Stop corrections of motions at the outer edge of the ramp.
 
         The stiffness of a sticking point decreases with the slope of the ramp, to zero at its outer edge. A point that
-        is pulled along its tool and hardly pressed is in equilibrium there. Full corrections then overshoot from both
-        sides.
+        is pulled along its tool and hardly pressed is in equilibrium close to this edge. Full corrections would move it
+        out of the ramp and back again, without end.
 
         Args:
             ramps: for each face, function of motions that returns the depths of its points in the ramp and the vectors
                 through the ramp along the normal (`Increment.in_ramp`).
             y: motions before the correction, flat, length.
             new: motions after the correction, flat, length.
-            entry_depth: depth in the ramp, over its width, at which a point stops when it enters the ramp, shape
+            entry_depth: depth in the ramp, over its width, at which each point stops when it enters the ramp, shape
                 (points,). It is changed in place: it grows for points that enter.
 
         Returns:
-            Motions after the stopped correction, flat; True if the correction must not be halved, since a point was
-            stopped or all points stick.
+            Motions after the correction, flat. True if a point was stopped or all points stick: the correction must
+            then not be halved, since the residual may increase on the way.
         """
         (before, _), (depth, path) = (self._gather_pairs(self._at_faces(ramps, z), (), (self._c,)) for z in (y, new))
-        leaves, enters = (before > _LOCAL.least_depth) & (depth <= 0), (before <= 0) & (depth > 0)
+        leaves, enters = (before > _LOCAL.min_depth) & (depth <= 0), (before <= 0) & (depth > 0)
         stopped = np.where(leaves, _LOCAL.kept_depth * np.minimum(before, 1.0),
                            np.where(enters, np.minimum(depth, entry_depth), depth))
         entry_depth[enters] *= _LOCAL.entry_growth
@@ -300,9 +301,10 @@ class _Points:
         return V - self._columns.updates(self._scale[:, None] * forces)
 
     def _with_added_stiffness(self, added: Array, y: Array) -> Array | None:
-        """Return (1 + C S)^-1 y, the motions y of the points with additional stiffnesses S; None if it is singular.
+        """Return (1 + C S)^-1 y: the motions y of the points, reduced by additional stiffnesses S; None if singular.
 
-        added: the stiffnesses S of k points, shape (k, c, c). y: motions, flat, or several as columns.
+        C is the compliance of the body at the k points, with c components each. added: their stiffnesses S, shape (k,
+        c, c). y: motions, shape (k c,), or several as columns.
         """
         n = len(y)
         J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), added).reshape(n, n)
@@ -322,19 +324,24 @@ class _Points:
         return np.concatenate([motion.reshape(-1, *dx.shape[1:]) for motion in motions])
 
     def _linearised(self) -> tuple[Array, Array]:
-        """Return the forces, flat, and stiffnesses, shape (k, c, c), of the points in the last linearised contact law.
+        """Return forces and stiffnesses of the k points in the last linearisation of the contact law.
+
+        Forces are flat; stiffnesses have the shape (k, c, c) for c components.
         """
         return self._forces([c.increment.last_tractions(i) for c, i in self._some])
 
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
-        """Return the forces, flat, and stiffnesses, shape (k, c, c), of the contact law after motions y, flat, length.
+        """Return the contact forces, flat, and stiffnesses, shape (k, c, c), of all k points after a motion.
 
-        laws: for each face a function from motions of its points to their tractions.
+        laws: for each face a function from motions of its points to their tractions. y: motions relative to the tools
+        since the last linearisation, with c components for each point, flat, length.
         """
         return self._forces([(tractions.force, tractions.stiffness) for tractions in self._at_faces(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-        """Gather pairs (forces, stiffnesses) of the faces from all ranks: forces, flat; stiffnesses, shape (k, c, c).
+        """Gather forces and stiffnesses of the k points of all ranks: forces, flat; stiffnesses, shape (k, c, c).
+
+        parts: for each face the forces, shape (points, c), and stiffnesses, shape (points, c, c), of its owned points.
         """
         force, stiffness = self._gather_pairs(parts, (self._c,), (self._c, self._c))
         return force.ravel(), stiffness

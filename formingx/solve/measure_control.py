@@ -28,23 +28,23 @@ class QuantitySteps:
     """Settings of steps in time along a prescribed amplitude of an output quantity.
 
     Attributes:
-        stretched: multiple of the step length. A step ends at the next time to be met exactly if this time lies within
-            this multiple, so that no short step is left over.
-        cut: largest factor by which the length of a step is reduced when the step is repeated.
-        still: relative change of the control in a step, below which the control counts as constant. Also the arc length
-            of a step, below which no limit point is sought in it.
-        located: tolerance of the time of a limit point, over the duration of its step.
-        met: relative tolerance of a target that is met inside a step.
-        contact: fraction of a step up to which the closure of gaps must admit it (`StepLimit.length`). A step that is
-            admitted for a smaller fraction fails.
+        max_step_ratio: multiple of the step length. A step ends at the next time to be met exactly if this time lies
+            within this multiple, so that no short step is left over.
+        max_cutback: largest factor by which the length of a step is reduced when the step is repeated.
+        min_control_change: relative change of the control in a step, below which the control counts as constant. Also
+            the arc length of a step, below which no limit point is sought in it.
+        time_tolerance: tolerance of the time of a limit point, over the duration of its step.
+        target_tolerance: relative tolerance of a target that is met inside a step.
+        min_contact_fraction: fraction of a step up to which the closure of gaps must admit it (`StepLimit.length`). A
+            step that is admitted for a smaller fraction fails.
     """
 
-    stretched: float = 1.5
-    cut: float = 0.6
-    still: float = 1e-7
-    located: float = 1e-4
-    met: float = 1e-8
-    contact: float = 0.5
+    max_step_ratio: float = 1.5
+    max_cutback: float = 0.6
+    min_control_change: float = 1e-7
+    time_tolerance: float = 1e-4
+    target_tolerance: float = 1e-8
+    min_contact_fraction: float = 0.5
 
 
 _STEPS = QuantitySteps()
@@ -76,20 +76,20 @@ class QuantityRun(Run):
         self.problem.clock = state.time
         super()._accept(state)
 
-    def _next(self, old: State) -> list[State]:
+    def _next_states(self, old: State) -> list[State]:
         """Return a list with the next state in time after `old`: a target or limit point in the step, or its end."""
         event = self._next_event(old.time)
         while True:
             left = event - old.time
             dt = min(self.step.length * self._duration, left)
-            dt = left if left < _STEPS.stretched * dt else dt
+            dt = left if left < _STEPS.max_step_ratio * dt else dt
             try:
                 new = self._solve_at(old, event if dt == left else old.time + dt)
                 error = self._error_in_time(new)
                 self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, self._limit_before(old, new))]
             except Cutback as cut:
-                self.step.length = min(cut.part, _STEPS.cut) * dt / self._duration
+                self.step.length = min(cut.part, _STEPS.max_cutback) * dt / self._duration
                 self._failed(str(cut), self.step.length)
                 if self.step.length < self.step.smallest:
                     self._give_up(f"the step in time became shorter than {self.step.smallest * self._duration:.3g}:"
@@ -117,7 +117,7 @@ class QuantityRun(Run):
         value = float(self._amplitude(time))
         x, control = self._predicted(old, time, value)
         trial, limit = TrialStep(old.x, old.control, x - old.x, control - old.control, 1.0), problem.limit
-        if limit and limit.length(trial) < _STEPS.contact:
+        if limit and limit.length(trial) < _STEPS.min_contact_fraction:
             raise Failure("too many points would come into contact in one step", [])
         if limit:
             limit.prepare(trial)
@@ -135,14 +135,14 @@ class QuantityRun(Run):
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
         length = self.curve.distance(old, new)
-        if length < _STEPS.still:
+        if length < _STEPS.min_control_change:
             return new
         if self.problem.relaxes:
             before = _rate([*predictor.recent_states(self.states[:-1], old.time, 2), old])
             after, step = _rate([*predictor.recent_states(self.states, new.time, 2), new]), new.time - old.time
         else:                                                # the tangents of the path show an extremum
             before, after, step = old.slope, new.slope, length
-        still = _STEPS.still * max(abs(old.control), abs(new.control)) / step
+        still = _STEPS.min_control_change * max(abs(old.control), abs(new.control)) / step
         if before * after >= 0 or min(abs(before), abs(after)) < still:
             return new
         tried: list[State] = []
@@ -152,7 +152,7 @@ class QuantityRun(Run):
             return -float(np.sign(before)) * tried[-1].control
         from scipy.optimize import minimize_scalar
         with contextlib.suppress(Failure):                   # then the extremum gets no state
-            error = _STEPS.located * (new.time - old.time)
+            error = _STEPS.time_tolerance * (new.time - old.time)
             minimize_scalar(below, bounds=(old.time, new.time), options={"xatol": error})
             new = max(tried, key=lambda state: np.sign(before) * state.control)
             new.kind = "limit point"
@@ -226,7 +226,7 @@ class QuantityRun(Run):
             found[time] = self._solve_at(old, time) if time > low else old
             return self.curve.value(quantity, found[time].x, found[time].control) - target.value
         time = _root(deviation, low, high)
-        miss, most = deviation(time), _STEPS.met * max(abs(target.value), _STEPS.met)
+        miss, most = deviation(time), _STEPS.target_tolerance * max(abs(target.value), _STEPS.target_tolerance)
         state = found[time]
         if not is_met(target, quantity.size, miss + target.value) and abs(miss) > most:
             raise Failure(f"{target} was passed but could not be solved for", [])

@@ -18,7 +18,7 @@ from .linear import DirectSolver
 from .local_contact import LocalSolve, Update, woodbury
 
 
-def relative(equations: Residual, forces: float, floor: float = Newton.unloaded) -> float:
+def relative(equations: Residual, forces: float, floor: float = Newton.force_floor) -> float:
     """Return the relative norm of unbalanced forces, |F| / (|support forces| + floor).
 
     Args:
@@ -39,7 +39,7 @@ class Iteration(NamedTuple):
 
     Attributes:
         residual: |F| before the iteration, relative to the support forces (`relative`).
-        correction: ``|dx|/(|x| + Newton.at_rest)``, criterion (3.5.1) of Song (1993).
+        correction: ``|dx|/(|x| + Newton.displacement_floor)``, criterion (3.5.1) of Song (1993).
         work: |F . dx| over its value in the first iteration, criterion (3.5.2) of Song (1993).
         chord: True if the tangent of an earlier iteration was used.
     """
@@ -86,12 +86,12 @@ class Tolerances:
     """Convergence criteria of a state, all of which must be met.
 
     Attributes:
-        correction: tolerance of the relative correction ``|dx|/(|x| + Newton.at_rest)`` that quadratic convergence
-            predicts for the next iteration.
+        correction: tolerance of the relative correction ``|dx|/(|x| + Newton.displacement_floor)`` that quadratic
+            convergence predicts for the next iteration.
         residual: tolerance of the norm of F relative to the support forces (`relative`).
         iterations: largest number of iterations with the same active set of contact.
         settling: largest number of iterations while the active set changes. Of iterations whose small correction led
-            to a new active set, `Newton.exempt` do not count.
+            to a new active set, `Newton.exempt_iterations` do not count.
 
     Raises:
         InputError: a value that is not greater than 0.
@@ -217,7 +217,7 @@ class BorderedNewton:
         only.
 
         Args:
-            hurried: True to allow `Newton.hurried` iterations only; False to change nothing.
+            hurried: True to allow `Newton.history_settling` iterations only; False to change nothing.
         """
         self._hurried = hurried and self.problem.has_history
         try:
@@ -225,39 +225,39 @@ class BorderedNewton:
         finally:
             self._hurried = False
 
-    def tangent(self, x: PETSc.Vec, control: float, ahead: bool = False) -> bool:
+    def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> bool:
         """Compute the tangent of the path at a solution of F = 0: the vector `b` = dx/dcontrol, with new factors.
 
         Args:
             x: unknowns of the solution.
             control: load parameter (control) of the state, dimensionless.
-            ahead: True for the one-sided derivatives of F towards the next step, where F has a kink.
+            one_sided: True for the one-sided derivatives of F towards the next step, where F has a kink.
 
         Returns:
             False if dF/dx is singular.
         """
-        if not self._factorise(x, control, ahead):
+        if not self._factorise(x, control, one_sided):
             return False
         self.solver.solve(self.F_control, self.b)
         self.b.scale(-1)
         return bool(np.isfinite(self.b.norm()))
 
-    def _factorise(self, x: PETSc.Vec, control: float, ahead: bool = False, rescale: bool = True) -> bool:
+    def _factorise(self, x: PETSc.Vec, control: float, one_sided: bool = False, rescale: bool = True) -> bool:
         """Factorise dF/dx at (x, control) and compute `F_control`; return False if dF/dx is singular.
 
-        ahead: True for the one-sided derivatives towards the next step, where F has a kink. rescale: True for a new
+        one_sided: True for the one-sided derivatives towards the next step, where F has a kink. rescale: True for a new
         scaling of rows and columns by MUMPS.
         """
-        matrix = self.problem.tangent(x, control, ahead)
+        matrix = self.problem.tangent(x, control, one_sided)
         if self._drag:
             self._drag.add_to(matrix)
         good, self._update = self.solver.factorise(rescale), None
         self._modified.note_tangent(self.problem.setting if good else None)
         if good and not self._drag:
-            self.problem.control_derivative(x, control, self.F_control, ahead)
+            self.problem.control_derivative(x, control, self.F_control, one_sided)
         return good
 
-    def update_ahead(self, x: PETSc.Vec, control: float) -> bool:
+    def update_one_sided(self, x: PETSc.Vec, control: float) -> bool:
         """Update the vector `b` = dx/dcontrol at a converged solution to the next step, without a factorisation.
 
         Where F has a kink, its one-sided derivative towards the next step differs from the factorised tangent. The
@@ -271,15 +271,15 @@ class BorderedNewton:
         Returns:
             False if too many points change, or the updated tangent is singular.
         """
-        update = woodbury(self.problem, self.problem.changes_ahead(x, control), self.solver)
+        update = woodbury(self.problem, self.problem.one_sided_changes(x, control), self.solver)
         found = update and update(self.b.array_r[:, None], 1.0)
         if found is None:
             return False
         self.b.array_w[:], self._update = found[:, 0], update
         return True
 
-    def solve_ahead(self, E: Array) -> Array | None:
-        """Return K^-1 E for the tangent K towards the next step, which `tangent` or `update_ahead` computed last.
+    def solve_one_sided(self, E: Array) -> Array | None:
+        """Return K^-1 E for the tangent K towards the next step, which `tangent` or `update_one_sided` computed last.
 
         Args:
             E: right-hand sides as columns, locally owned rows, shape (n, m).
@@ -318,10 +318,10 @@ class BorderedNewton:
         self.reached = control, 0.0
         self._modified.begin(problem.setting, chords and not problem.has_kinks)
         work0 = moved = 0.0
-        active = ActiveSetChanges(problem, self.settings.small)
+        active = ActiveSetChanges(problem, self.settings.small_correction)
         points = LocalSolve(problem) if problem.has_kinks else None
         while True:
-            residual = relative(problem, self.F.norm(), self.settings.unloaded)
+            residual = relative(problem, self.F.norm(), self.settings.force_floor)
             if not np.isfinite(residual):
                 raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
             if history:
@@ -340,7 +340,7 @@ class BorderedNewton:
                 raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
             share = active.share
-            if points and active.changed == len(history) != self.settings.left_alone:
+            if points and active.changed == len(history) != self.settings.uncorrected_iteration:
                 border = BorderedTangent(self.gradient, self.b, self._slope)
                 step, share = points.correct(self.solver, self.a, step, border), 1.0
                 if points.failed == 2 and problem.has_history:
@@ -351,7 +351,7 @@ class BorderedNewton:
             x.axpy(share, self.a)
             control += share * step
             moved = self._norm(self.a, step)
-            correction = moved / (self._norm(x, control) + self.settings.at_rest)
+            correction = moved / (self._norm(x, control) + self.settings.displacement_floor)
             if not np.isfinite(correction):
                 raise Failure("the tangent matrix is singular", history)
             history.append(Iteration(residual, correction, work / work0, chord))
@@ -374,14 +374,14 @@ class BorderedNewton:
         """
         settings, quiet = self.settings, history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
-        diverged = len(history) > 2 and min(iteration.correction for iteration in history[-3:]) > settings.diverged
-        if diverged or grown and not (self.problem.has_kinks and moved < settings.small):
+        diverged = len(history) > 2 and min(i.correction for i in history[-3:]) > settings.divergence_correction
+        if diverged or grown and not (self.problem.has_kinks and moved < settings.small_correction):
             raise Failure("Newton's method diverges", history)
-        if active.returns >= settings.cycles:
+        if active.returns >= settings.max_cycles:
             raise Failure("contact does not settle: the same points change between open, sticking and sliding"
                           " over and over", history)
-        most = min(self.tolerances.settling, settings.hurried) if self._hurried else self.tolerances.settling
-        settling = len(history) - min(active.found, settings.exempt) >= most
+        most = min(self.tolerances.settling, settings.history_settling) if self._hurried else self.tolerances.settling
+        settling = len(history) - min(active.found, settings.exempt_iterations) >= most
         if len(quiet) >= self.tolerances.iterations or settling:
             unsettled = settling and len(history) - active.changed < 3
             where = "contact does not settle: " * unsettled

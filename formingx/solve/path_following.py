@@ -41,11 +41,11 @@ class PathFollowing:
     """Settings for cutbacks and for giving up. The length of steps is set by `StepControl`.
 
     Attributes:
-        inaccurate: time integration error over its tolerance above which a step is repeated.
+        max_time_error: time integration error over its tolerance above which a step is repeated.
         snap_through: settings of snap-through (`SnapThrough`).
     """
 
-    inaccurate: float = 1.4
+    max_time_error: float = 1.4
     snap_through: SnapThrough = SnapThrough()
 
 
@@ -110,7 +110,7 @@ class Run:
                     self._give_up(f"max_steps = {max_steps} were used up before it", pace=self.targets.pace(max_steps))
                 self._check_progress()
                 states = self.states
-                for state in self._next(states[-1]):
+                for state in self._next_states(states[-1]):
                     self._accept(state)
                     self._stop_if(self.targets.jumped_past(state))
                     if state.kind == "limit point" and self._jumps.rule == "stop":
@@ -164,7 +164,7 @@ class Run:
         may be reached further along the path, too.
         """
         record, last = self.record, self.record.last
-        number = record.restore()                           # of states with the present step data
+        number = record.restore()                           # of states with the current step data
         targets, quantity = self.targets, self.targets.quantity
         pressure = isinstance(quantity, Amplitude) and quantity.is_load
         if may_turn and last.stepping.get("until") != [*targets.until[:2]] and not pressure:
@@ -178,7 +178,7 @@ class Run:
         met = [s.target[:2] for s in self.states if s.target]
         targets.open = [(target, quantity) for target, quantity in targets.open if target[:2] not in met]
         kept = next((s.stepping for s in reversed(self.states) if s.stepping), {})
-        self._jumps.change, no_equilibrium_at = kept.get("jumps", (self.settings.snap_through.ahead, None))
+        self._jumps.change, no_equilibrium_at = kept.get("jumps", (self.settings.snap_through.control_change, None))
         self._jumps.no_equilibrium_at = np.nan if no_equilibrium_at is None else no_equilibrium_at
         return kept
 
@@ -195,7 +195,7 @@ class Run:
         self.record.complete_step(self.step, self.targets.until, given=self._step and asdict(self._step),
                                   accuracy=self._accuracy, jumps=jumps)
 
-    def _next(self, old: State) -> list[State]:
+    def _next_states(self, old: State) -> list[State]:
         """Return the states of the next step from `old`, in order; the last one is its end, or a target within reach.
 
         A failure halves the step. A snap-through is tried if the path leads back, if short steps fail, or if the
@@ -215,7 +215,7 @@ class Run:
             if length < self.step.length:
                 self._limited("gap closure", length)
             try:
-                return self._take(old, length, target, quantity, reach, end)
+                return self._try_step(old, length, target, quantity, reach, end)
             except Cutback as cut:
                 most, end = cut.part * reach, cut.control if cut.lasts and most < np.inf else None
                 self.step.length = most if cut.lasts else self.step.length
@@ -232,9 +232,9 @@ class Run:
                     old.kind == "start" and self.problem.has_history or self._jumps.found_no_equilibrium_near(old))
                 if self._jumps.allowed and (not good or early):
                     lengths.pop(0)
-                    for ahead in (reach,) if good else (last, 0.0):
+                    for start_length in (reach,) if good else (last, 0.0):
                         with contextlib.suppress(Failure):
-                            return [self._jump(old, ahead, first)]
+                            return [self._jump(old, start_length, first)]
                 if not good:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {failure.reason}",
                                   failure.attempt)
@@ -249,7 +249,7 @@ class Run:
         self.record.counts.limits[why] = self.record.counts.limits.get(why, 0) + 1
         self._progress.limited(why, length)
 
-    def _take(self, old: State, length: float, target: Target | None, quantity: Quantity | None,
+    def _try_step(self, old: State, length: float, target: Target | None, quantity: Quantity | None,
               reach: float, end: float | None = None) -> list[State]:
         """Return the states of one step from `old`, of a given arc length, or to a target at the arc length `reach`.
 
@@ -272,7 +272,7 @@ class Run:
             new.target = target
         rejection = limit and limit.check(old, new, reach, ends=True)
         if rejection:
-            part = min(max(rejection.fraction, 0.1), self.settings.snap_through.most_of_step(self.curve.iterations))
+            part = min(max(rejection.fraction, 0.1), self.settings.snap_through.retry_fraction(self.curve.iterations))
             raise Cutback(rejection.reason, part) if rejection.fraction else _PassedState(rejection.reason, [])
         if self._jumps.rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
@@ -281,7 +281,7 @@ class Run:
         error, variables = self._error_in_time(new), self.problem.history_variables
         try:
             new = separate_points(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
-            states, self._jumps.change = self._states_within(old, new), self.settings.snap_through.ahead
+            states, self._jumps.change = self._states_within(old, new), self.settings.snap_through.control_change
         except Failure:
             self.problem.history_variables = variables
             raise
@@ -307,7 +307,7 @@ class Run:
         if self._time_error is None:
             return 0.0
         error = self._time_error.ratio(self.states, new.x, new.control)
-        if error > self.settings.inaccurate:
+        if error > self.settings.max_time_error:
             part = max(0.8 * error ** (-1 / 3), 0.1)
             past = self.states[-1].control
             raise Cutback("the error in time", part, lasts=True, control=past + part * (new.control - past))
@@ -398,7 +398,7 @@ class Run:
             self._give_up("at {} {:.6g}: {}; allow_inadmissible=True goes on".format(
                 *self.problem.shown(state.control), inadmissible), hint="")
         if self.problem.has_kinks:
-            self.curve.look_ahead(state)
+            self.curve.update_path_tangent(state)
         self.targets.accept(state)
         record.counts.iterations += self.curve.spent()
         log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)

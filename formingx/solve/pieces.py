@@ -18,14 +18,14 @@ def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers:
     All other amplitudes stay constant. With the control lambda, an amplitude is base + rate lambda.
 
     Args:
-        amplitudes: present amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
+        amplitudes: current amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
         scales: value of each in the user's units at amplitude 1, in the same order.
         numbers: index of the controlled one in `Scene.items`, then of the others that move with it.
         stage: the stage, whose speed or duration relates the process time to the control.
         clocked: True if process time may pass while the control changes.
 
     Returns:
-        Base and rate of each amplitude, then of the process time (`StepData`); present value of the control.
+        Base and rate of each amplitude, then of the process time (`StepData`); current value of the control.
     """
     base, rate = list(amplitudes), [0.0] * len(amplitudes)
     control, scale = base[numbers[0]], scales[numbers[0]]
@@ -51,7 +51,7 @@ def table_step_data(amplitudes: list[float], scales: Sequence[float], tables: li
     largest change of an amplitude, or 1 if no amplitude changes. An amplitude is base + rate lambda.
 
     Args:
-        amplitudes: present amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
+        amplitudes: current amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
         scales: value of each in the user's units at amplitude 1, in the same order.
         tables: [(index in `Scene.items`, knots (time, value) in the user's units, shape (n, 2))].
         now: first process time.
@@ -63,7 +63,7 @@ def table_step_data(amplitudes: list[float], scales: Sequence[float], tables: li
     base, change = list(amplitudes), [0.0] * len(amplitudes)
     for i, table in tables:
         first, value = table[0]
-        if now < first - SAME_TIME * abs(first):            # straight from the present value to the first knot
+        if now < first - SAME_TIME * abs(first):            # straight from the current value to the first knot
             part = min((then - now) / (first - now), 1.0)
             change[i] = part * (value / scales[i] - base[i])
         else:                                               # a constant piece inherits no round-off from before
@@ -94,7 +94,7 @@ def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
 
     Args:
         tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))].
-        now: present process time.
+        now: current process time.
         end: process time at the end of the stage.
 
     Returns:

@@ -1,7 +1,7 @@
 """A process: stages in order, each with its own control. A stage starts from the last state of the stage before.
 
 Meshes, forms and solver are created once. The step data of a stage (`StepData`) state how the amplitudes of all items
-depend on the control. The controlled item has the control as its amplitude; other items keep their present values. With
+depend on the control. The controlled item has the control as its amplitude; other items keep their current values. With
 tables against time, the time is the control in each piece between two knots. An item that becomes inactive (an open
 grip, a plug that is not there yet) leaves unbalanced forces. They fade to zero along a path of their own.
 """
@@ -79,7 +79,7 @@ class Execution:
 
         Raises:
             ConvergenceError: a stage does not reach its target.
-            InputError: a stage contradicts the present state of the process.
+            InputError: a stage contradicts the current state of the process.
         """
         self._max_steps, self._progress = max_steps, progress
         last = self.record.last.setting if self.record.states else {"stage": 0, "piece": -1}
@@ -124,8 +124,8 @@ class Execution:
             found.append((target, quantity))
         return found
 
-    def _left_to_meet(self) -> _Targets:
-        """Return the pairs (target, output quantity) of the present stage that are still to be met.
+    def _open_targets(self) -> _Targets:
+        """Return the pairs (target, output quantity) of the current stage that are still to be met.
 
         A remeshing within a stage starts a new run. Intermediate targets that this stage met on an earlier mesh are
         left out.
@@ -144,15 +144,15 @@ class Execution:
         return self.problem.setting, last.x if last else self._unloaded, last.control if last else 0.0
 
     def _present_value(self, number: int) -> float:
-        """Return the present value of the item with a number in the scene, in the user's units."""
+        """Return the current value of the item with a number in the scene, in the user's units."""
         setting, _, control = self._present()
         return setting.amplitude(number, control) * self.problem.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
-        """Set new step data in the problem for a piece of the present stage, a run with its own step data.
+        """Set new step data in the problem for a piece of the current stage, a run with its own step data.
 
         base, rate: an amplitude is base + rate times the control, for all `Scene.items`, then the process time. piece:
-        number of the piece. control: its value at the present state. fading: True if the forces that a change of the
+        number of the piece. control: its value at the current state. fading: True if the forces that a change of the
         active items leaves out of balance decrease to 0 as the control goes to 1.
         """
         changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
@@ -160,7 +160,7 @@ class Execution:
         self.problem.enter(setting, self._present()[1], control)
 
     def _resumed(self, control: float) -> State:
-        """Return the present state of the process as the first state of a run with new step data.
+        """Return the current state of the process as the first state of a run with new step data.
 
         The unknowns are the same, but the control and the tangent of the path depend on the step data. control: value
         of the control at this state under the new step data.
@@ -183,7 +183,7 @@ class Execution:
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
         """Follow the path until the last target is met, and return the targets that are still open.
 
-        targets, result: pairs (target, output quantity). control: value of the control at the present state, where the
+        targets, result: pairs (target, output quantity). control: value of the control at the current state, where the
         run starts; None: continue an interrupted run. requested: another target that ends the run if it is met before
         the last one, or None.
         """
@@ -197,7 +197,7 @@ class Execution:
         return run.targets.open
 
     def _change_items(self, begun: bool) -> None:
-        """Change the active loads, supports and contacts of the present stage, and let unbalanced forces fade to 0.
+        """Change the active loads, supports and contacts of the current stage, and let unbalanced forces fade to 0.
 
         This is piece 0 of the stage. begun: True to continue it.
 
@@ -234,10 +234,10 @@ class Execution:
         numbers: its index in `Scene.items`, then the indices of items that move with it. begun: True to continue it.
         """
         control = None if begun else self._enter_control(numbers)
-        self._trace(self._left_to_meet(), control)
+        self._trace(self._open_targets(), control)
 
     def _enter_control(self, numbers: list[int], clocked: bool = True) -> float:
-        """Set step data in which the amplitude of a load, support or contact is the control; return its present value.
+        """Set step data in which the amplitude of a load, support or contact is the control; return its current value.
 
         numbers: its index in `Scene.items`, then the indices of items that move with it. clocked: True if process time
         may pass while the control changes.
@@ -252,7 +252,7 @@ class Execution:
         return f"stage {self._stage.name!r} ({self._k + 1} of {len(self.plans)}), "
 
     def _amplitudes(self) -> list[float]:
-        """Return the present dimensionless amplitudes of all items, then the process time."""
+        """Return the current dimensionless amplitudes of all items, then the process time."""
         setting, _, control = self._present()
         return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
@@ -264,12 +264,12 @@ class Execution:
         """
         control = None if begun else self._enter_control(numbers, clocked=False)
         target, amplitude, times = self._prescribed_amplitude(self.problem.setting.base[-1])
-        run = QuantityRun(self.record, target.bind(self.problem), amplitude, times, self._left_to_meet(),
+        run = QuantityRun(self.record, target.bind(self.problem), amplitude, times, self._open_targets(),
                    self._stage.step or self._step or (None if begun else _IN_TIME), self._accuracy, self._label)
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _prescribed_amplitude(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
-        """Return the prescribed amplitude of an output quantity in the present stage, which begins at the time `now`.
+        """Return the prescribed amplitude of an output quantity in the current stage, which begins at the time `now`.
 
         The result is (target of the quantity, function of time that returns its value in the user's units, times to be
         met exactly). The times are the start of the stage, the corners and the end of the amplitude.
@@ -301,7 +301,7 @@ class Execution:
         to begin.
         """
         before, _, control = self._present()
-        stage, through = self._stage, self._left_to_meet()
+        stage, through = self._stage, self._open_targets()
         now = before.base[-1] if piece else self.problem.time_at(control)
         end = end_time(stage, tables, now)
         if not piece:
@@ -350,7 +350,7 @@ class Execution:
         return left
 
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
-        """Check that tables fit the present process time and the present values of their items.
+        """Check that tables fit the current process time and the current values of their items.
 
         tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))]. now: process time. end: process time at
         the end of the stage.

@@ -88,7 +88,7 @@ class Record:
     Attributes:
         segments: list of `Segment`; accepted states are added to the last one.
         counts: cost of the run (`Counts`).
-        stage: name of the present stage of a process, or "".
+        stage: name of the current stage of a process, or "".
         ended: reason for which the run ended before its targets, as a result and not as an error; "" if it did not.
         hooks: functions that the run calls (`RunHooks`).
         findings: findings of the checks before the run.
@@ -106,17 +106,17 @@ class Record:
 
     @property
     def problem(self) -> Any:
-        """Present problem, with the full interface of its class."""
+        """Current problem, with the full interface of its class."""
         return self.segments[-1].problem
 
     @property
     def equations(self) -> Equations:
-        """Present problem, through the interface of the solver."""
+        """Current problem, through the interface of the solver."""
         return self.curve.problem
 
     @property
     def curve(self) -> Curve:
-        """Solver of the present problem."""
+        """Solver of the current problem."""
         return self.segments[-1].curve
 
     @property

@@ -46,54 +46,55 @@ class SnapThrough:
         lengths: arc lengths, decreasing. A step that fails twice below one of them is replaced by a snap-through, once
             for each length. A snap-through starts at the last length along the tangent if a kink of F reverses the
             path, or if no shorter step is left.
-        ahead: change of the control in a snap-through, at first.
-        furthest: largest change of the control in a snap-through.
-        eta: first value of eta.
-        least: value of eta below which the snap-through has failed.
-        most: largest eta before the body has begun to move.
-        most_moving: largest eta after the body has begun to move.
-        falls: smallest factor by which eta decreases, after a viscous solution with at most `few` Newton iterations.
-        few: largest number of Newton iterations of a viscous solution after which eta decreases.
-        grows: factor of eta after a failed viscous solution, before the body has begun to move.
-        grows_moving: factor of eta after a failed viscous solution, after the body has begun to move.
+        control_change: change of the control in a snap-through, at first.
+        max_control_change: largest change of the control in a snap-through.
+        first_viscosity: first value of eta.
+        min_viscosity: value of eta below which the snap-through has failed.
+        max_viscosity: largest eta before the body has begun to move.
+        max_viscosity_in_motion: largest eta after the body has begun to move.
+        min_viscosity_factor: smallest factor by which eta decreases, after a viscous solution with at most
+            `max_easy_iterations` Newton iterations.
+        max_easy_iterations: largest number of Newton iterations of a viscous solution after which eta decreases.
+        viscosity_growth: factor of eta after a failed viscous solution, before the body has begun to move.
+        viscosity_growth_in_motion: factor of eta after a failed viscous solution, after the body has begun to move.
         tolerances: tolerances of a viscous solution. If contact does not settle soon, more viscosity is cheaper than
             more iterations. With looser tolerances a nearly singular tangent looks like equilibrium too early.
-        nearest: smallest distance that the body should move in a viscous solution.
-        farthest: largest distance that the body should move in a viscous solution.
-        share: distance that the body should move in a viscous solution, over the distance moved so far.
-        again: limit of the distance moved in the first viscous solution, over the distance that the body should move.
-            Above this limit the solution is repeated with more viscosity.
-        solutions: number of viscous solutions after which the snap-through has failed. Where a sheet is drawn over an
-            edge point by point, hundreds of solutions are needed.
-        too_far: distance moved after which the snap-through has failed.
-        iterations: Newton iterations of one step, failed attempts and snap-throughs included, after which the step
+        min_distance: smallest distance that the body should move in a viscous solution.
+        max_distance: largest distance that the body should move in a viscous solution.
+        distance_ratio: distance that the body should move in a viscous solution, over the distance moved so far.
+        repetition_ratio: limit of the distance moved in the first viscous solution, over the distance that the body
+            should move. Above this limit the solution is repeated with more viscosity.
+        max_solutions: number of viscous solutions after which the snap-through has failed. Where a sheet is drawn over
+            an edge point by point, hundreds of solutions are needed.
+        max_total_distance: distance moved after which the snap-through has failed.
+        max_iterations: Newton iterations of one step, failed attempts and snap-throughs included, after which the step
             tries no further snap-through and halves its length.
-        near_rest: viscous forces below which a solution without viscosity is tried.
-        at_rest: viscous forces below which the body is in equilibrium, even if the iteration without viscosity fails.
-            This iteration may oscillate where a point is at a kink of its friction law.
+        trial_force: viscous forces below which a solution without viscosity is tried.
+        equilibrium_force: viscous forces below which the body is in equilibrium, even if the iteration without
+            viscosity fails. This iteration may oscillate where a point is at a kink of its friction law.
     """
 
     lengths: tuple[float, ...] = (1e-2, 1e-3)
-    ahead: float = 1e-6
-    furthest: float = 1e-3
-    eta: float = 1.0
-    least: float = 1e-9
-    most: float = 1e5
-    most_moving: float = 1e9
-    falls: float = 0.1
-    few: int = 6
-    grows: float = 10.0
-    grows_moving: float = 3.0
+    control_change: float = 1e-6
+    max_control_change: float = 1e-3
+    first_viscosity: float = 1.0
+    min_viscosity: float = 1e-9
+    max_viscosity: float = 1e5
+    max_viscosity_in_motion: float = 1e9
+    min_viscosity_factor: float = 0.1
+    max_easy_iterations: int = 6
+    viscosity_growth: float = 10.0
+    viscosity_growth_in_motion: float = 3.0
     tolerances: Tolerances = Tolerances(1e-8, 1e-6, settling=8)
-    nearest: float = 3e-4
-    farthest: float = 0.1
-    share: float = 0.1
-    again: float = 3.0
-    solutions: int = 1000
-    iterations: int = 5000
-    too_far: float = 10.0
-    near_rest: float = 1e-3
-    at_rest: float = 1e-10
+    min_distance: float = 3e-4
+    max_distance: float = 0.1
+    distance_ratio: float = 0.1
+    repetition_ratio: float = 3.0
+    max_solutions: int = 1000
+    max_iterations: int = 5000
+    max_total_distance: float = 10.0
+    trial_force: float = 1e-3
+    equilibrium_force: float = 1e-10
 
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
         """Return the step lengths below which the second failure of a step triggers a snap-through.
@@ -109,7 +110,7 @@ class SnapThrough:
         """
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
-    def most_of_step(self, iterations: int) -> float:
+    def retry_fraction(self, iterations: int) -> float:
         """Return the largest fraction of the length of a failed step with which the step is tried again.
 
         Args:
@@ -118,7 +119,7 @@ class SnapThrough:
         Returns:
             0.5 after more than the allowed iterations, else 1.0.
         """
-        return 0.5 if iterations > self.iterations else 1.0
+        return 0.5 if iterations > self.max_iterations else 1.0
 
 
 class NoEquilibrium(Failure):
@@ -171,7 +172,7 @@ class _Motion:
         passed: earlier states of the path, to which the body must not return.
 
     Attributes:
-        state: present position of the body, as a state.
+        state: current position of the body, as a state.
         dissipated: energy dissipated so far, dimensionless.
         solved: number of viscous solutions so far.
         unbalanced: norm of the viscous forces in the last solution, relative to the support forces.
@@ -188,15 +189,16 @@ class _Motion:
         self._x = curve.problem.x.duplicate()
         self._pull: Array = np.zeros(len(old.x))
         self.state, self.dissipated, self.solved = old, 0.0, 0
-        self.unbalanced, self.trial_force = np.inf, settings.near_rest
+        self.unbalanced, self.trial_force = np.inf, settings.trial_force
         self.settles = False
         self._wait = False                                  # eta may not fall after the next solution
 
     def continues(self, eta: float) -> bool:
         """Return True if the viscosity eta, over the shear modulus, and the distance moved so far are within bounds."""
         settings = self._settings
-        most = settings.most_moving if self.solved else settings.most
-        return settings.least < eta < most and self.curve.moved(self._old, self.state) < settings.too_far
+        most = settings.max_viscosity_in_motion if self.solved else settings.max_viscosity
+        moved = self.curve.moved(self._old, self.state)
+        return settings.min_viscosity < eta < most and moved < settings.max_total_distance
 
     def move(self, origin: Array, eta: float) -> float:
         """Solve F(x) + eta V (x - origin) = 0, and take the solution as the new position unless it is rejected.
@@ -227,9 +229,10 @@ class _Motion:
         if self._goes_back(last, new):                      # to the unstable state where the motion began
             return self._reject()
         pull = self._drag.forces(x)
-        most = np.clip(settings.share * self.curve.moved(self._old, last), settings.nearest, settings.farthest)
+        most = np.clip(settings.distance_ratio * self.curve.moved(self._old, last), settings.min_distance,
+                       settings.max_distance)
         far = self.curve.moved(replace(last, x=origin), new) / most
-        if not self.solved and far > settings.again:
+        if not self.solved and far > settings.repetition_ratio:
             return self._reject(far)
         before, self.unbalanced = self.unbalanced, relative(self.problem, np.sqrt(self._sum(pull * pull)))
         self.settles = self.unbalanced < min(self.trial_force, before)
@@ -239,8 +242,8 @@ class _Motion:
         if limit:
             limit.prepare(TrialStep(x, self.control, x - last.x, 0.0, 1.0))
         self.solved += 1
-        stays, self._wait = self._wait or len(history) - 1 > settings.few, False
-        return max(1.0 if stays else settings.falls, far)
+        stays, self._wait = self._wait or len(history) - 1 > settings.max_easy_iterations, False
+        return max(1.0 if stays else settings.min_viscosity_factor, far)
 
     def _reject(self, grows: float = 0.0) -> float:
         """Reject a solution, and return the factor by which the viscosity eta grows.
@@ -248,10 +251,10 @@ class _Motion:
         After the next solution eta stays constant or grows. grows: the factor; 0: the factor of the settings.
         """
         self._wait = True
-        return grows or (self._settings.grows_moving if self.solved else self._settings.grows)
+        return grows or (self._settings.viscosity_growth_in_motion if self.solved else self._settings.viscosity_growth)
 
     def equilibrium(self) -> State | None:
-        """Return the equilibrium state near the present position, solved for without viscous forces.
+        """Return the equilibrium state near the current position, solved for without viscous forces.
 
         Returns:
             The state, of kind "jump". None if none is near, or if the body moved back to it: against the sign of the
@@ -259,13 +262,13 @@ class _Motion:
 
         Raises:
             Failure: the iteration fails although the viscous forces have vanished, in a body without history variables.
-                With history variables, the present position then counts as the equilibrium state.
+                With history variables, the current position then counts as the equilibrium state.
         """
         try:
             with self.curve.newton.in_a_hurry(True):        # after a failure, the viscous motion continues
                 state = self.curve.solve(self.state.x, self.control, fixed(self.control), "jump", self.state)
         except Failure:
-            if self.unbalanced > self._settings.at_rest:
+            if self.unbalanced > self._settings.equilibrium_force:
                 self.settles, self.trial_force = False, 0.3 * self.unbalanced
                 return None
             if not self.problem.has_history:                # another branch starts here
@@ -310,7 +313,7 @@ class _Motion:
         self._x.destroy()
 
 
-def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings: SnapThrough,
+def snap_through(curve: Curve, old: State, change: float, from_tangent: bool, settings: SnapThrough,
                  solutions: int | None = None, listener: Callable[[], None] = lambda: None, work_sign: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
     """Return the equilibrium state to which the body snaps from a state when the control changes further.
@@ -319,10 +322,11 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
         curve: solver of the path.
         old: the state from which the body snaps.
         change: change of the control, dimensionless; its sign is the direction of the process.
-        ahead: True to start at the point on the tangent of `old` with the changed control, False to start at `old`.
+        from_tangent: True to start at the point on the tangent of `old` with the changed control, False to start at
+            `old`.
         settings: settings of snap-through.
         solutions: largest number of solutions with viscous forces, after which the snap-through fails; None:
-            `settings.solutions`.
+            `settings.max_solutions`.
         listener: function that is called before each viscous solution.
         work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either. At a maximum of the
             enclosed volume, for example, a growing pressure must find a state with a larger volume.
@@ -337,13 +341,13 @@ def snap_through(curve: Curve, old: State, change: float, ahead: bool, settings:
     """
     problem, kept = curve.problem, curve.problem.history_variables
     motion = _Motion(curve, old, old.control + change, settings, work_sign, passed)
-    origin = old.x + change / old.slope * old.direction if ahead else old.x
-    eta, solutions = settings.eta, solutions or settings.solutions
+    origin = old.x + change / old.slope * old.direction if from_tangent else old.x
+    eta, solutions = settings.first_viscosity, solutions or settings.max_solutions
     try:
         while motion.solved < solutions and motion.continues(eta):
-            if curve.iterations > settings.iterations:
+            if curve.iterations > settings.max_iterations:
                 log.info("no jump within %d Newton iterations of this step: shorter steps are tried", curve.iterations)
-                raise Failure(f"a jump took more than {settings.iterations} Newton iterations", [])
+                raise Failure(f"a jump took more than {settings.max_iterations} Newton iterations", [])
             listener()
             state = motion.equilibrium() if motion.settles else None
             if state is not None:

@@ -34,11 +34,11 @@ class Stage:
             tables. With a `duration` and no control it ends the stage early, such as `sag(30.0)`.
         intermediate: further targets to meet exactly during the stage; targets that are not met are left out.
         inactive: items that are inactive during the stage, themselves or their names, such as a support, a tool or a
-            load. A support that becomes active again constrains the body at its present position. A load that becomes
+            load. A support that becomes active again constrains the body at its current position. A load that becomes
             active again has its last value; its column is 0 while it is inactive.
         amplitudes: instead of `control`: {item: [(time, value), ...]}, piecewise linear in time, values in the user's
             units; the last value stays. If a table begins later than the stage, the item changes linearly from its
-            present value. With `control`, the key is not an item but a function that makes targets, such as
+            current value. With `control`, the key is not an item but a function that makes targets, such as
             `enclosed_volume`. The control is then adjusted so that this quantity follows the table. The table may be a
             function of time; then `until` is the `process_time` of its end.
         speed: rate of the control, in its unit per time, greater than 0. Process time then passes in the stage.
@@ -255,10 +255,10 @@ def plan(scene: Scene, stage: Stage) -> Plan:
             raise InputError(f"{caller}: {item!r} is both driven and left out")
     if len({scene.same_tool(number)[0] for number in numbers}) < len(numbers):
         raise InputError(f"{caller}: one item has two tables")
-    present = [item for i, item in enumerate(scene.items) if i not in inactive]
+    active = [item for i, item in enumerate(scene.items) if i not in inactive]
     try:
-        supports = [item for item in present if item in scene.supports]
-        scene.check_constrained(supports, any(contact in present for contact in scene.contacts))
+        supports = [item for item in active if item in scene.supports]
+        scene.check_constrained(supports, any(contact in active for contact in scene.contacts))
         scene.check_driven(supports)
         targets = [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None]
         target_checks.check(scene, targets, inactive)

@@ -42,7 +42,7 @@ class StateSolver:
         self.newton = BorderedNewton(problem, tolerances, self.norm)
         self._iterations = 0
         self._found: State | None = None                    # state whose tangent was factorised last
-        self._ahead_of: tuple[State | None, int] = None, 0  # state of the factors ahead; factorisations until then
+        self._one_sided_state: tuple[State | None, int] = None, 0   # state of one-sided factors; number of factors then
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: PETSc.Vec, control: float) -> float:
@@ -131,7 +131,7 @@ class StateSolver:
             control: load parameter (control) of the state, dimensionless.
 
         Returns:
-            The state, of kind "start", with the tangent of the path under the present step data of the problem.
+            The state, of kind "start", with the tangent of the path under the current step data of the problem.
 
         Raises:
             Failure: the tangent is singular.
@@ -193,7 +193,7 @@ class StateSolver:
         return replace(found, direction=sense * found.direction, slope=sense * found.slope, target=new.target,
                        jump=new.jump)
 
-    def look_ahead(self, state: State) -> None:
+    def update_path_tangent(self, state: State) -> None:
         """Compute the path tangent of an accepted state for the next step, with updated history variables.
 
         The factors of the last iteration are used again if the tangent differs at a few contact points only. There are
@@ -206,15 +206,15 @@ class StateSolver:
         self._x.array_w[:] = state.x
         limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
         at_hand, self._found = at_hand and not (limit and limit.predicts_events), None
-        if at_hand and self.newton.update_ahead(self._x, state.control) or self.newton.tangent(
-                self._x, state.control, ahead=True):
+        if at_hand and self.newton.update_one_sided(self._x, state.control) or self.newton.tangent(
+                self._x, state.control, one_sided=True):
             size = self._length_of(self.newton.b)
             direction, slope = self.newton.b.array_r / size, 1 / size
             sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
             state.direction, state.slope = sense * direction, sense * slope
-            self._ahead_of = state, self.newton.solver.count
+            self._one_sided_state = state, self.newton.solver.count
 
-    def factorise_ahead(self, state: State) -> bool:
+    def factorise_one_sided(self, state: State) -> bool:
         """Factorise the one-sided tangent dF/dx towards the next step, unless it was factorised last.
 
         Args:
@@ -223,11 +223,11 @@ class StateSolver:
         Returns:
             False if the tangent is singular.
         """
-        if self._ahead_of != (state, self.newton.solver.count):
+        if self._one_sided_state != (state, self.newton.solver.count):
             self._x.array_w[:] = state.x
-            if not self.newton.tangent(self._x, state.control, ahead=True):
+            if not self.newton.tangent(self._x, state.control, one_sided=True):
                 return False
-            self._ahead_of = state, self.newton.solver.count
+            self._one_sided_state = state, self.newton.solver.count
         return True
 
     def value(self, quantity: Quantity, x: Array, control: float) -> float:
@@ -273,7 +273,7 @@ class StateSolver:
         """
         return state.slope
 
-    def work_ahead(self, state: State) -> float:
+    def work_rate(self, state: State) -> float:
         r"""Return the work of the controlled load along the tangent of a state, per unit of control and of arc length.
 
         .. math:: -\frac{\partial F}{\partial \lambda} \cdot \frac{dx}{ds}
@@ -295,7 +295,7 @@ class StateSolver:
     def work(self, a: State, b: State) -> float:
         """Return the work of the controlled load between two states, per unit of control, by the trapezoidal rule.
 
-        The integrand is -(dF/dcontrol) . dx, as in `work_ahead`.
+        The integrand is -(dF/dcontrol) . dx, as in `work_rate`.
 
         Args:
             a: first state.
@@ -313,7 +313,7 @@ class StateSolver:
         return done
 
     def spend(self, iterations: int) -> None:
-        """Count the Newton iterations of another solver for the present step.
+        """Count the Newton iterations of another solver for the current step.
 
         Args:
             iterations: number of iterations, such as those with viscous forces.

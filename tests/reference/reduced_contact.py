@@ -45,7 +45,7 @@ class ReferencePoints:
         """As `Points.rates`."""
         (N, T), system = self.parts(force, near), self.condensed(u, near, force)
         here = status != ContactStatus.FREE
-        slack = here & (np.abs(N).max(initial=0.0) * SEARCH.limit >= N) & ~self.pulls
+        slack = here & (np.abs(N).max(initial=0.0) * SEARCH.limit_tolerance >= N) & ~self.pulls
         for begin in (status, np.where(slack, ContactStatus.FREE, status)):
             found = self.agreed(system, begin.copy(), near, N, T, here)
             if found is not None:
@@ -56,22 +56,22 @@ class ReferencePoints:
     def agreed(self, system, status, near, N, T, here):
         """Rates of forces and positions, and statuses that satisfy Coulomb's law; None if the search failed."""
         seen, mu, compliance = set(), self.mu, self.C.diagonal().reshape(len(N), -1).mean(1)
-        for k in range(SEARCH.tries):
+        for k in range(SEARCH.max_trials):
             try:
                 F, dx = self.solved(system, status, near)
             except np.linalg.LinAlgError:
                 return None
             (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != ContactStatus.FREE
-            negligible = SEARCH.limit * (np.abs(N).max() + SEARCH.comparison_length * np.abs(dN).max())
+            negligible = SEARCH.limit_tolerance * (np.abs(N).max() + SEARCH.comparison_length * np.abs(dN).max())
             other, miss = status.copy(), np.zeros(len(N))
             slides = held & (status != ContactStatus.STICKS) & (mu > 0)
-            turns = slides & (status * along < -SEARCH.negligible * np.abs(along).max())
+            turns = slides & (status * along < -SEARCH.negligible_rate * np.abs(along).max())
             other[turns], miss[turns] = ContactStatus.STICKS, np.abs(along[turns])
-            most = mu * ((1 - SEARCH.limit) * N - negligible)
+            most = mu * ((1 - SEARCH.limit_tolerance) * N - negligible)
             at_limit = held & (status == ContactStatus.STICKS) & (self.friction < np.inf) & (np.abs(T) >= most)
             sense = np.where(np.abs(T) > mu * negligible, np.sign(T), np.sign(dT))
             over = sense * dT - mu * dN
-            slips = at_limit & (over > SEARCH.negligible * np.abs(dT).max())
+            slips = at_limit & (over > SEARCH.negligible_rate * np.abs(dT).max())
             other[slips], miss[slips] = sense[slips], (over * compliance)[slips]
             opens = held & ~self.pulls & (negligible >= N) & (dN < 0)
             other[opens], miss[opens] = ContactStatus.FREE, -(dN * compliance)[opens]
@@ -82,7 +82,7 @@ class ReferencePoints:
             changes = np.flatnonzero(other != status)
             if not len(changes):
                 return F, dx, status
-            if k >= SEARCH.all_at_once or status.tobytes() in seen:
+            if k >= SEARCH.simultaneous_trials or status.tobytes() in seen:
                 changes = changes[[np.argmax(miss[changes])]]
             seen.add(status.tobytes())
             status[changes] = other[changes]
@@ -91,7 +91,7 @@ class ReferencePoints:
     def change(self, status, near, force, rate):
         """As `Points.change`."""
         (N, T), (dN, dT), held = self.parts(force, near), self.parts(rate, near), status != ContactStatus.FREE
-        negligible = SEARCH.limit * max(np.abs(N).max(initial=0.0), 1e-30)
+        negligible = SEARCH.limit_tolerance * max(np.abs(N).max(initial=0.0), 1e-30)
         times, other = np.full(len(status), np.inf), status.copy()
         opens = held & ~self.pulls & (dN < 0) & (negligible < N)
         times[opens], other[opens] = -N[opens] / dN[opens], ContactStatus.FREE
@@ -99,7 +99,7 @@ class ReferencePoints:
         mu = self.friction[k]
         for sense in (ContactStatus.SLIDES, ContactStatus.SLIDES_BACK):
             margin, closing = mu * N[k] - sense * T[k], sense * dT[k] - mu * dN[k]
-            slips = (closing > 0) & (margin > SEARCH.limit * mu * np.abs(N[k]))
+            slips = (closing > 0) & (margin > SEARCH.limit_tolerance * mu * np.abs(N[k]))
             t = np.divide(margin, closing, out=np.full(len(k), np.inf), where=slips)
             first = t < times[k]
             times[k[first]], other[k[first]] = t[first], sense
@@ -133,7 +133,7 @@ class ReferencePoints:
         compliance, a = A @ C @ B, np.zeros(len(point))
         largest = np.abs(compliance).max(1, initial=0.0)
         most = largest.max(initial=0.0)
-        stiff = np.flatnonzero(largest < SEARCH.negligible * most)
+        stiff = np.flatnonzero(largest < SEARCH.negligible_rate * most)
         compliance[stiff, stiff] = most
         if to is not None:
             n = 2 * len(sticks)

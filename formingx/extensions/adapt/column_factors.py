@@ -99,7 +99,7 @@ def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) ->
         length = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(1)
         with problem.state_context(state):
             for contact, face in zip(problem.contacts, faces):
-                if not contact.present:
+                if not contact.active:
                     continue
                 positions = points[face] - contact.tool_displacement(state.control)
                 nearest = contact.contact.tool.nearest(positions.reshape(-1, positions.shape[-1]))

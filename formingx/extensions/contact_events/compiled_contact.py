@@ -344,5 +344,10 @@ void frame(long m, const double *positions, const long *rows, const double *forc
 
 
 def compiled() -> Any:
-    """Return the functions `forces_at_end`, `rates`, `change` and `frame` in C; arrays are passed by address."""
+    """Return an object with the compiled C functions; arrays are passed to them by address.
+
+    For m contact points of a `Points` object, `forces_at_end` computes contact forces after a motion, `rates` their
+    derivatives with respect to arc length, `change` the first change of a contact status, and `frame` the tool geometry
+    (`ToolFrame`).
+    """
     return functions("reduced_contact", _HEADER, _SOURCE)

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -24,6 +24,7 @@ from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
 from ...values.tolerances import FAR
 from .gap_closure import GapClosure
+from .path_segment import PathSegment
 from .reduced_contact import Points, ToolFrame
 from .response import Response
 
@@ -33,78 +34,37 @@ class EventSettings:
     """Limits and tolerances of the event prediction.
 
     Attributes:
-        iterations: maximum number of equilibrium iterations per event.
-        to_tools: number of projections of closed points onto curved tools.
-        to_surface: maximum number of Newton iterations that locate a gap closure on the surface of the tool.
-        changes: maximum number of status changes (slip, opening) between two gap closures.
-        sliding_points: maximum number of points that slide at the start whose contact forces become unknowns.
-        sticking: convergence tolerance of the position of a point that sticks, over its tributary length.
-        sliding: convergence tolerance of the position of a point that may slide, over its tributary length.
-        simultaneous: fraction of the step within which two closures count as simultaneous.
-        earlier: maximum number of times that an earlier closure replaces the one being located.
-        late: largest relative change of the arc length of an event in one equilibrium iteration.
-        work: maximum number of equilibrium iterations and status changes in a step; then the step closes one gap.
+        max_iterations: maximum number of equilibrium iterations per event.
+        projections: number of projections of closed points onto their tools, which converge in a few steps if the tools
+            are curved.
+        max_surface_iterations: maximum number of Newton iterations that locate a gap closure on the surface of the
+            tool.
+        max_changes: maximum number of status changes (slip, opening) between two gap closures.
+        max_sliding_points: maximum number of points that slide at the accepted state. With more, their contact forces
+            follow from the stiffness in the factorised tangent instead of Coulomb's law.
+        sticking_tolerance: convergence tolerance of the position of a point that sticks, over its tributary length.
+        sliding_tolerance: convergence tolerance of the position of a point that may slide, over its tributary length.
+        simultaneous_fraction: fraction of the step within which two closures count as simultaneous.
+        max_replacements: maximum number of times that an earlier closure replaces the one being located.
+        max_arc_length_change: largest relative change of the arc length of an event in one equilibrium iteration.
+        max_work: maximum number of equilibrium iterations and status changes in the prediction of a step. If it is
+            reached, the prediction is not used, and the step closes one gap.
     """
 
-    iterations: int = 8
-    to_tools: int = 4
-    to_surface: int = 3
-    changes: int = 100
-    sliding_points: int = 80
-    sticking: float = 1e-3
-    sliding: float = 1e-2
-    simultaneous: float = 0.02
-    earlier: int = 3
-    late: float = 1.0
-    work: int = 200
+    max_iterations: int = 8
+    projections: int = 4
+    max_surface_iterations: int = 3
+    max_changes: int = 100
+    max_sliding_points: int = 80
+    sticking_tolerance: float = 1e-3
+    sliding_tolerance: float = 1e-2
+    simultaneous_fraction: float = 0.02
+    max_replacements: int = 3
+    max_arc_length_change: float = 1.0
+    max_work: int = 200
 
 
 _SETTINGS = EventSettings()
-
-
-class _Segment(NamedTuple):
-    """Linear segment of the predicted path, from an arc length to the next event, with m points of known compliance.
-
-    Attributes:
-        begins: arc length at the start of the segment, from the accepted state.
-        positions: positions of the n points of all faces relative to their tools at the start, shape (n, 2), length.
-        speed: derivatives of the positions with respect to arc length, shape (n, 2), length.
-        status: contact statuses, shape (m,).
-        place: sticking positions, shape (m, 2), length.
-        force: contact forces in F at the start, shape (m, 2), dimensionless.
-        rate: derivatives of `force` with respect to arc length, shape (m, 2).
-        extra: change of `force` beyond the contact stiffness in the factorised tangent, shape (m, 2).
-        growth: derivatives of `extra` with respect to arc length, shape (m, 2).
-        correction: sum of the equilibrium corrections of (x, control).
-    """
-
-    begins: float
-    positions: np.ndarray
-    speed: np.ndarray
-    status: np.ndarray
-    place: np.ndarray
-    force: np.ndarray
-    rate: np.ndarray
-    extra: np.ndarray
-    growth: np.ndarray
-    correction: tuple[np.ndarray, float]
-
-    def after(self, time: float) -> _Segment:
-        """Return the remaining segment, which starts at the arc length `time`."""
-        ds = time - self.begins
-        return self if ds == 0 else self._replace(begins=time, positions=self.positions + ds * self.speed,
-                                                  force=self.force + ds * self.rate,
-                                                  extra=self.extra + ds * self.growth)
-
-    def extended(self, m: int) -> _Segment:
-        """Return this segment of the path with forces and statuses for m points (`Points`); added points are open."""
-        added = m - len(self.status)
-        if not added:
-            return self
-        blank = np.zeros((added, self.force.shape[1]))
-        grown = {name: np.concatenate([getattr(self, name), blank])
-                 for name in ("place", "force", "rate", "extra", "growth")}
-        return self._replace(status=np.append(self.status, np.full(added, ContactStatus.FREE)), **grown)
 
 
 class ContactEventSequence:
@@ -115,13 +75,13 @@ class ContactEventSequence:
         n: number of locally owned unknowns of the fields, the first entries of x.
         x, control: unknowns (locally owned entries) and control of the accepted state.
         direction, slope: derivatives of x and of the control with respect to arc length.
-        response: linearised response of the body to contact forces.
+        response: `Response`, which solves for the motion of the body under contact forces by the stored LU factors.
         batch: number of points of a face whose compliance is computed at a time.
 
     Attributes:
         touching: number of closed points of each face at the state, on all ranks.
         ends: arc length up to which the prediction is valid; inf without a limit.
-        stops: True if no admissible contact statuses were found at `ends`.
+        stops: True if the prediction ends since no admissible contact statuses were found at `ends`.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,
@@ -137,19 +97,19 @@ class ContactEventSequence:
                          for closed in self._points.of_faces(self._area & ~self._free)]
         self._closures: list[GapClosure] = []
         blank = np.zeros((0, start[0].shape[1]))
-        self._pieces = [_Segment(0.0, np.concatenate(start), self._along, np.zeros(0, dtype=int), blank, blank, blank,
-                                 blank, blank, (np.zeros(len(x)), 0.0))]
+        self._pieces = [PathSegment(0.0, np.concatenate(start), self._along, np.zeros(0, dtype=int), blank, blank,
+                                    blank, blank, blank, (np.zeros(len(x)), 0.0))]
         self._near = self._points.tool_frame(self._pieces[0].positions, blank)     # at the start of the last segment
-        self._end: _Segment | None = None                     # end of the last segment, in equilibrium
-        self._taken = self._work = 0                        # closures with a contact force; see `EventSettings.work`
+        self._end: PathSegment | None = None                # end of the last segment, in equilibrium
+        self._taken = self._work = 0                        # closures with a contact force; `EventSettings.max_work`
         self.ends, self.stops = np.inf, False
         if not self._free_sliding():
             self._pieces, self.ends = self._pieces[:1], 0.0
 
     @property
     def exhausted(self) -> bool:
-        """True if the prediction of this step has reached the limit `EventSettings.work`."""
-        return self._work >= _SETTINGS.work
+        """True if the prediction used up its number of equilibrium iterations and status changes for a step."""
+        return self._work >= _SETTINGS.max_work
 
     def next(self, k: int, length: float) -> GapClosure | None:
         """Return the gap closure number k along the path, at which the points of earlier closures carry contact forces.
@@ -165,13 +125,13 @@ class ContactEventSequence:
             if self.ends < np.inf or self.exhausted:
                 return None
             if self._taken < len(self._closures) and not self._close(length):
-                self.ends = self._closures[-1].time
+                self.ends = self._closures[-1].arc_length
                 return None
             if not self._find_next(length):
                 return None
             if not self._equilibrate(length):
-                self.ends = self._closures[-1].time
-        return self._closures[k] if self._closures[k].time < length else None
+                self.ends = self._closures[-1].arc_length
+        return self._closures[k] if self._closures[k].arc_length < length else None
 
     def closures(self, length: float) -> tuple[list[np.ndarray], ...]:
         """Return the gap closures within an arc length `length`, as four lists with an array for each face.
@@ -183,14 +143,14 @@ class ContactEventSequence:
             length before the closure, shape (n, 2); 0 for other points.
         """
         piece, points = self._piece(length), self._points
-        times, positions = np.full(len(piece.positions), length), piece.after(length).positions.copy()
+        arc_lengths, positions = np.full(len(piece.positions), length), piece.after(length).positions.copy()
         speeds, sure = np.zeros_like(positions), np.zeros(len(positions), dtype=bool)
         for closure in self._closures:
-            time, i = closure.time, points.row(closure)
-            if time < length and closure.rank == self._comm.rank:
-                times[i], positions[i], speeds[i] = time, closure.place, self._piece(time).speed[i]
+            s, i = closure.arc_length, points.row(closure)
+            if s < length and closure.rank == self._comm.rank:
+                arc_lengths[i], positions[i], speeds[i] = s, closure.place, self._piece(s).speed[i]
         points.spread(piece.extended(len(points.point_ids)).status != ContactStatus.FREE, sure)
-        return tuple(points.of_faces(values) for values in (times, positions, sure, speeds))
+        return tuple(points.of_faces(values) for values in (arc_lengths, positions, sure, speeds))
 
     def positions(self, length: float) -> list[np.ndarray]:
         """Return for each face the positions of its owned points relative to the tool at an arc length, shape (n, 2).
@@ -206,17 +166,18 @@ class ContactEventSequence:
         piece = piece.extended(m).after(length)
         if not len(piece.status):
             return None
-        for _ in range(_SETTINGS.to_tools):
+        for _ in range(_SETTINGS.projections):
             piece = self._projected(piece)
         if not np.isfinite(piece.extra).all():
             return None
         return (piece.correction[0] - self._points.columns @ piece.extra.ravel(),
                 piece.correction[1] - float(self._points.steps @ piece.extra.ravel()))
 
-    def _projected(self, piece: _Segment, moved: np.ndarray | None = None) -> _Segment:
+    def _projected(self, piece: PathSegment, moved: np.ndarray | None = None) -> PathSegment:
         """Return a segment at whose start closed points are projected onto their tools or sticking positions.
 
-        Curved tools need a few projections. moved: motion of the n points before it, shape (n, 2), length.
+        Repeat it for curved tools, since a projection is along their tangents. moved: motion of the n points that is
+        added to the start of the segment before the projection, shape (n, 2), length; None: no motion.
         """
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         u = np.zeros(piece.force.shape) if moved is None else points.values_at(moved)
@@ -226,8 +187,8 @@ class ContactEventSequence:
         return piece._replace(positions=positions if moved is None else positions + moved, force=force,
                               extra=piece.extra + added)
 
-    def _piece(self, length: float) -> _Segment:
-        """Return the last segment that begins before an arc length."""
+    def _piece(self, length: float) -> PathSegment:
+        """Return the segment of the predicted path at an arc length: the last one that begins before it."""
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
     def _free_sliding(self) -> bool:
@@ -235,7 +196,7 @@ class ContactEventSequence:
         x, control = self._tangent[:2]
         points = self._points
         slide = self._area & ~self._free & ~points.sticks
-        if not 0 < combined(self._comm, int(np.sum(slide)), MPI.SUM) <= _SETTINGS.sliding_points:
+        if not 0 < combined(self._comm, int(np.sum(slide)), MPI.SUM) <= _SETTINGS.max_sliding_points:
             return True
         if not points.learn([np.flatnonzero(s) for s in points.of_faces(slide)], touched=True):
             return False
@@ -252,10 +213,11 @@ class ContactEventSequence:
         del self._pieces[0]
         return True
 
-    def _append(self, piece: _Segment, status: np.ndarray, near: ToolFrame | None = None) -> bool:
-        """Append a segment from the start of `piece`, with new statuses, shape (m,); False if none are admissible.
+    def _append(self, piece: PathSegment, status: np.ndarray, near: ToolFrame | None = None) -> bool:
+        """Append a segment with new contact statuses to the path; return False if no statuses are admissible.
 
-        near: geometry of the tools there, if it is known.
+        piece: segment whose start is the start of the new one. status: first statuses of the search, shape (m,). near:
+        geometry of the tools at this start; None: it is computed.
         """
         points, near = self._points, near or self._points.tool_frame(piece.positions, piece.force)
         self._near, self._work = near, self._work + 1
@@ -274,7 +236,9 @@ class ContactEventSequence:
         return True
 
     def _close(self, length: float) -> bool:
-        """Append the segment after the last closure, whose point carries a contact force; return False if this fails.
+        """Append the segment after the last gap closure, in which the closed point carries a contact force.
+
+        length: arc length of the step, up to which points are chosen. The result is False if no segment was found.
         """
         last, closure, end = self._pieces[-1], self._closures[-1], self._end
         if end is None or closure.point_id not in self._points.point_ids and not self._learn(length):
@@ -289,91 +253,109 @@ class ContactEventSequence:
         return self._append(end._replace(status=status, place=place), status, near)
 
     def _find_next(self, length: float) -> bool:
-        """Store the next gap closure within an arc length, after changes of status; return False if there is none."""
-        for _ in range(_SETTINGS.changes):
+        """Store the next gap closure in the list of closures; return False if there is none within an arc length.
+
+        Changes of contact statuses that come before it are appended to the path first.
+        """
+        for _ in range(_SETTINGS.max_changes):
             last = self._pieces[-1]
             if last.begins >= length or self.exhausted:
                 return False
-            times = self._gap_closures(last, length - last.begins)
-            first = min(listed(self._comm, float(times.min(initial=np.inf))))
+            arc_lengths = self._gap_closures(last, length - last.begins)
+            first = min(listed(self._comm, float(arc_lengths.min(initial=np.inf))))
             after, status = self._points.change(last.status, self._near, last.force, last.rate)
             if not after < min(first, length - last.begins):
                 break
             if not self._append(last.after(last.begins + after), status):
                 self.ends, self.stops = last.begins + after, True
                 return False
-        if self._store_first(last.begins + times, length, last):
+        if self._store_first(last.begins + arc_lengths, length, last):
             return True
         self._end = self._iterated(length, last)
         return self._end is not None and self._store_first(self._missed(self._end, last), length, last)
 
-    def _gap_closures(self, segment: _Segment, length: float) -> np.ndarray:
-        """Return the arc lengths from the start of a segment at which the n points close, shape (n,); else `length`."""
+    def _gap_closures(self, segment: PathSegment, length: float) -> np.ndarray:
+        """Return the arc lengths, from the start of a segment, at which the gaps of the n points close, shape (n,).
+
+        segment: straight segment of the predicted path. length: arc length of its end; the result for other points.
+        """
         parts = zip(self._faces, *map(self._points.of_faces, (segment.positions, segment.speed, self._free)))
         return np.concatenate([gap_closures(face.law, x, w, free, length) for face, x, w, free in parts])
 
-    def _store_first(self, times: np.ndarray, length: float, segment: _Segment) -> bool:
-        """Store the earliest closure before `length`; return False if there is none. times: arc lengths, shape (n,)."""
-        k = int(np.argmin(times)) if len(times) else 0
-        best = (float(times[k]), self._comm.rank, *self._points.face_and_point(k)) if len(times) else (length, 0, 0, 0)
-        time, rank, f, i = min(listed(self._comm, best))
-        if not time < length:
+    def _store_first(self, arc_lengths: np.ndarray, length: float, segment: PathSegment) -> bool:
+        """Store the earliest gap closure of all ranks; return False if there is none before an arc length.
+
+        arc_lengths: arc lengths of the gap closures of the n points, shape (n,). segment: segment with their positions.
+        """
+        best: tuple[float, int, int, int] = (length, 0, 0, 0)
+        if len(arc_lengths):
+            k = int(np.argmin(arc_lengths))
+            best = float(arc_lengths[k]), self._comm.rank, *self._points.face_and_point(k)
+        s, rank, f, i = min(listed(self._comm, best))
+        if not s < length:
             return False
-        self._closures.append(self._closure(rank, f, i, time, segment.after(time).positions))
+        self._closures.append(self._closure(rank, f, i, s, segment.after(s).positions))
         return True
 
-    def _closure(self, rank: int, f: int, i: int, time: float, positions: np.ndarray) -> GapClosure:
-        """Return the gap closure of point i of face f near the arc length `time`, with `positions` there."""
+    def _closure(self, rank: int, f: int, i: int, s: float, positions: np.ndarray) -> GapClosure:
+        """Return the gap closure of point i of face f near the arc length `s`, with `positions` there."""
         closure: Any = None
         if rank == self._comm.rank:
             face, row = self._faces[f], self._points.starts[f] + i
             x, w = positions[row], self._pieces[-1].speed[row]
-            ds = crossing(face.law, i, x, w, self._pieces[-1].begins - time, _SETTINGS.sticking, _SETTINGS.to_surface)
-            closure = GapClosure(time + ds, rank, f, i, x + ds * w, float(face.rule.lengths[i]),
+            ds = crossing(face.law, i, x, w, self._pieces[-1].begins - s, _SETTINGS.sticking_tolerance,
+                          _SETTINGS.max_surface_iterations)
+            closure = GapClosure(s + ds, rank, f, i, x + ds * w, float(face.rule.lengths[i]),
                                  bool(self._points.sticks[row]))
         return closure if self._comm.size == 1 else self._comm.bcast(closure, root=rank)
 
     def _equilibrate(self, length: float) -> bool:
-        """Equilibrate the path at the last closure and locate the closure again; return False without convergence."""
+        """Bring the predicted path to equilibrium at the last gap closure, and locate this closure again.
+
+        Modified Newton iterations correct the unknowns there. length: arc length of the step. The result is False
+        without convergence.
+        """
         last, closure = self._pieces[-1], self._closures[-1]
-        self._end = end = last.after(closure.time)
-        if closure.time - last.begins < _SETTINGS.simultaneous * length:
+        self._end = end = last.after(closure.arc_length)
+        if closure.arc_length - last.begins < _SETTINGS.simultaneous_fraction * length:
             return True
-        tried: list[tuple[_Segment, _Segment]] = []
-        for _ in range(_SETTINGS.iterations * _SETTINGS.earlier):
-            if len(tried) == _SETTINGS.iterations or self.exhausted:
+        tried: list[tuple[PathSegment, PathSegment]] = []
+        for _ in range(_SETTINGS.max_iterations * _SETTINGS.max_replacements):
+            if len(tried) == _SETTINGS.max_iterations or self.exhausted:
                 return False
-            closure, moved = self._closures[-1], self._iterated(closure.time, end)
+            closure, moved = self._closures[-1], self._iterated(closure.arc_length, end)
             if moved is None:
                 return False
-            found = self._closure(*closure.point_id, closure.time, moved.positions)
-            tried.append((end, moved.after(found.time)))
+            found = self._closure(*closure.point_id, closure.arc_length, moved.positions)
+            tried.append((end, moved.after(found.arc_length)))
             mixed = self._anderson_mixture(tried)
             if mixed is None:
                 return False
             end = mixed
             found = self._closure(*closure.point_id, end.begins, end.positions)
-            if not (found.time > last.begins and abs(found.time - closure.time) < _SETTINGS.late * closure.time):
+            late = abs(found.arc_length - closure.arc_length) >= _SETTINGS.max_arc_length_change * closure.arc_length
+            if late or not found.arc_length > last.begins:
                 return False
-            self._closures[-1], self._end = found, (end := end.after(found.time))
-            near = (_SETTINGS.sticking if found.sticks else _SETTINGS.sliding) * found.length
+            self._closures[-1], self._end = found, (end := end.after(found.arc_length))
+            near = (_SETTINGS.sticking_tolerance if found.sticks else _SETTINGS.sliding_tolerance) * found.length
             if np.linalg.norm(found.place - closure.place) < near:
-                times = self._missed(end, last, found)
-                if not self._store_first(times, found.time, end):
+                arc_lengths = self._missed(end, last, found)
+                if not self._store_first(arc_lengths, found.arc_length, end):
                     return True
                 self._closures.pop(-2)                      # another gap closed before
                 tried = []
         return False
 
-    def _missed(self, end: _Segment, last: _Segment, but: GapClosure | None = None) -> np.ndarray:
-        """Return the arc lengths at which open points passed the tool's surface, if inside it at `end`, shape (n,).
+    def _missed(self, end: PathSegment, last: PathSegment, but: GapClosure | None = None) -> np.ndarray:
+        """Return the arc lengths at which open points passed the surface of a tool, shape (n,).
 
-        For other points, and for the point of the closure `but`, the result is the arc length of `end`.
+        They are inside the tool at the start of the segment `end`, and moved along `last`, the segment before. For
+        other points, and for the point of the closure `but`, the result is the arc length of `end`.
         """
-        times, free = np.full(len(self._free), end.begins), self._free.copy()
+        arc_lengths, free = np.full(len(self._free), end.begins), self._free.copy()
         if but and but.rank == self._comm.rank:
             free[self._points.row(but)] = False
-        parts = map(self._points.of_faces, (times, end.positions, last.speed, free))
+        parts = map(self._points.of_faces, (arc_lengths, end.positions, last.speed, free))
         for face, t, x, w, candidates in zip(self._faces, *parts):
             near = face.law.nearest(x)
             inside = candidates & (near.distance > -face.law.theta)
@@ -383,9 +365,9 @@ class ContactEventSequence:
             back = np.divide(near.distance + face.law.theta, rate, out=np.zeros(len(x)), where=inside & (rate > 0))
             left = end.begins - last.begins
             t[inside] = last.begins + np.clip(left - back, 1e-3 * left, 0.999 * left)[inside]
-        return times
+        return arc_lengths
 
-    def _anderson_mixture(self, tried: list[tuple[_Segment, _Segment]]) -> _Segment | None:
+    def _anderson_mixture(self, tried: list[tuple[PathSegment, PathSegment]]) -> PathSegment | None:
         """Return the combination of equilibrium iterates by Anderson acceleration (1965); None if they diverge.
 
         tried: pairs (segment before an iteration, segment after it).
@@ -408,17 +390,20 @@ class ContactEventSequence:
             positions=mean([p.positions for p in after]), extra=mean([p.extra for p in after]),
             correction=(mean([p.correction[0] for p in after]), float(mean([p.correction[1] for p in after]))))
 
-    def _iterated(self, time: float, piece: _Segment) -> _Segment | None:
-        """Return the segment after an equilibrium iteration at the arc length `time`; None if it failed."""
-        piece, points = piece.extended(len(self._points.point_ids)).after(time), self._points
+    def _iterated(self, s: float, piece: PathSegment) -> PathSegment | None:
+        """Return a segment with unknowns corrected by one modified Newton iteration; None if it fails.
+
+        s: arc length of the iteration. piece: segment before it. Positions and forces of the points change, too.
+        """
+        piece, points = piece.extended(len(self._points.point_ids)).after(s), self._points
         x, control, direction, slope = self._tangent
         self._work += 1
         forces = np.full(piece.positions.shape, np.nan)
         forces[self._free] = 0.0
         points.spread(piece.force, forces)
         change = self._response.to_equilibrium(
-            x + time * direction + piece.correction[0] - points.columns @ piece.extra.ravel(),
-            control + time * slope + piece.correction[1] - float(points.steps @ piece.extra.ravel()),
+            x + s * direction + piece.correction[0] - points.columns @ piece.extra.ravel(),
+            control + s * slope + piece.correction[1] - float(points.steps @ piece.extra.ravel()),
             points.of_faces(forces))
         if change is None:
             return None
@@ -429,14 +414,18 @@ class ContactEventSequence:
         return piece._replace(correction=(piece.correction[0] + change[0], piece.correction[1] + change[1]))
 
     def _learn(self, length: float) -> bool:
-        """Compute the compliance at the points of the last and of likely next closures; False without LU factors."""
+        """Compute the compliance of the point that closed last and of points that will close next.
+
+        length: arc length of the step, up to which points are chosen. The result is False if the stored LU factors no
+        longer belong to the state.
+        """
         last, closure, points, chosen = self._pieces[-1], self._closures[-1], self._points, []
         left = length - last.begins
-        times = self._gap_closures(last, left)
-        points.spread(np.full(len(points.point_ids), left), times)
+        arc_lengths = self._gap_closures(last, left)
+        points.spread(np.full(len(points.point_ids), left), arc_lengths)
         if closure.rank == self._comm.rank:
-            times[points.row(closure)] = -1.0
-        for of_face in points.of_faces(times):
+            arc_lengths[points.row(closure)] = -1.0
+        for of_face in points.of_faces(arc_lengths):
             first = np.argsort(of_face, kind="stable")[: self._batch]
             chosen.append(np.sort(first[of_face[first] < left]))
         return points.learn(chosen)

@@ -8,10 +8,12 @@ import numpy as np
 
 
 class GapClosure(NamedTuple):
-    """Contact event: an open point reaches the outer edge of the ramp of its tool. All ranks store the same value.
+    """Contact event: the gap of an open point closes, at the signed distance -theta from its tool.
+
+    The half-width theta of the contact ramp belongs to the contact law. All ranks store the same value.
 
     Attributes:
-        time: arc length of the event from the accepted state.
+        arc_length: arc length of the event from the accepted state.
         rank: rank that owns the point.
         face: number of the contact face.
         point: local number of the point.
@@ -20,7 +22,7 @@ class GapClosure(NamedTuple):
         sticks: True if the point sticks under any force (contact without slip).
     """
 
-    time: float
+    arc_length: float
     rank: int
     face: int
     point: int

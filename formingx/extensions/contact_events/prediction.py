@@ -28,7 +28,7 @@ class ContactEventPredictor:
     """Predictor of the contact events in a step: gap closure, sliding and opening.
 
     Args:
-        limit: limits of a step by contact, which calls `active` and `predict`.
+        limit: the `StepLimit` of the problem, which knows the active contacts; it uses this predictor.
     """
 
     def __init__(self, limit: StepLimit):
@@ -53,11 +53,14 @@ class ContactEventPredictor:
 
     @property
     def active(self) -> bool:
-        """True if a face sticks, so that the result depends on the order of gap closures, and all laws are predictable.
+        """True if contact events are predicted for the contacts that are active now.
+
+        At least one face must stick, since only then the order of the gap closures matters. All contact laws must be
+        predictable (`ContactLaw.predictable`), so that forces follow from distances.
         """
-        present = self._limit.present
-        return any(c.face.contact.sticks and self.allowed(c) > c.max_closures for c in present) and all(
-            c.face.law.predictable for c in present)
+        contacts = self._limit.active_contacts
+        return any(c.face.contact.sticks and self.allowed(c) > c.max_closures for c in contacts) and all(
+            c.face.law.predictable for c in contacts)
 
     def predict(self, curve: Any, state: Any) -> ContactEventPrediction | None:
         """Return the contact events after an accepted state.
@@ -70,12 +73,12 @@ class ContactEventPredictor:
             The prediction. None if the predictor is not `active`, if the tangent is singular, or at the start of a path
             without a closed point.
         """
-        n, present = curve.problem.n_owned, self._limit.present
+        n, contacts = curve.problem.n_owned, self._limit.active_contacts
         if not self.active or state.kind == "start" and not any(
-                [c.touches(state.x[:n], state.control) for c in present]) or not curve.factorise_ahead(state):
+                [c.touches(state.x[:n], state.control) for c in contacts]) or not curve.factorise_one_sided(state):
             return None
         self._vectors = self._vectors or [curve.problem.x.duplicate(), curve.problem.x.duplicate()]
-        return ContactEventPrediction(present, [self.allowed(c) for c in present], n, state,
+        return ContactEventPrediction(contacts, [self.allowed(c) for c in contacts], n, state,
                                       Response(curve, state, *self._vectors))
 
 
@@ -83,16 +86,16 @@ class ContactEventPrediction:
     """Predicted contact events after an accepted state, for steps of different lengths.
 
     Args:
-        present: active contacts.
+        contacts: active contacts.
         allowed: number of points of each contact whose gaps may close in one step.
         n: number of locally owned unknowns of the fields, the first entries of x.
         state: the accepted state.
         response: linearised response of the body to contact forces at this state.
     """
 
-    def __init__(self, present: list[Approach], allowed: list[int], n: int, state: Any, response: Response):
-        self._present, self._allowed, self._known = present, allowed, True
-        self._sequence = ContactEventSequence([c.face for c in present], n, state.x, state.control, state.direction,
+    def __init__(self, contacts: list[Approach], allowed: list[int], n: int, state: Any, response: Response):
+        self._contacts, self._allowed, self._known = contacts, allowed, True
+        self._sequence = ContactEventSequence([c.face for c in contacts], n, state.x, state.control, state.direction,
                                               state.slope, response, max(allowed))
 
     def step_length(self, length: float) -> float | None:
@@ -107,31 +110,31 @@ class ContactEventPrediction:
             Arc length, at most `length`. None if the prediction failed; then the other methods also return None.
         """
         found, sequence = self._to_enough_closures(length) if self._known else None, self._sequence
-        while found is not None and found > LIMITS.shortest and any(
+        while found is not None and found > LIMITS.min_length and any(
                 [c.cuts_tool(a, b)
-                 for c, a, b in zip(self._present, sequence.positions(0.0), sequence.positions(found))]):
+                 for c, a, b in zip(self._contacts, sequence.positions(0.0), sequence.positions(found))]):
             found /= 2
         self._known = found is not None
         return found
 
     def _to_enough_closures(self, length: float) -> float | None:
-        """Return the arc length, at most `length`, at which enough gaps have closed; None if the prediction fails.
+        """Return the arc length, at most `length`, at which the allowed number of gaps of a face has closed.
 
-        The step ends before a gap closure if a point that sticks at its start opens earlier. The prediction keeps this
-        point closed, so later closures would be wrong.
+        The prediction keeps points closed that stick at the start of the step. If such a point is in tension before a
+        gap closure, the step therefore ends before this closure. The result is None if the prediction fails.
         """
-        sequence, before, at_start = self._sequence, 0.0, LIMITS.closed_at_start * length
+        sequence, before, at_start = self._sequence, 0.0, LIMITS.start_fraction * length
         allowed = [most if touching > 1 else 1 for most, touching in zip(self._allowed, sequence.touching)]
         for k in range(2 * sum(allowed)):
             closure = sequence.next(k, length)
             if closure is None:
                 break
-            if closure.time > max(at_start, LIMITS.shortest) and self._separates(closure.time):
-                return closure.time - LIMITS.closed_at_start * (closure.time - before)
-            before = closure.time
-            allowed[closure.face] -= closure.time > at_start
+            if closure.arc_length > max(at_start, LIMITS.min_length) and self._separates(closure.arc_length):
+                return closure.arc_length - LIMITS.start_fraction * (closure.arc_length - before)
+            before = closure.arc_length
+            allowed[closure.face] -= closure.arc_length > at_start
             if not allowed[closure.face]:
-                return min(LIMITS.overshoot * closure.time, length)
+                return min(LIMITS.overshoot * closure.arc_length, length)
         else:
             return None
         if sequence.exhausted:
@@ -149,7 +152,7 @@ class ContactEventPrediction:
         2), length, derivatives dN/dx, shape (m, 2)).
         """
         found = []
-        for f, (approach, x) in enumerate(zip(self._present, self._sequence.positions(0.0))):
+        for f, (approach, x) in enumerate(zip(self._contacts, self._sequence.positions(0.0))):
             face, contact = approach.face, approach.face.contact
             if contact.sticks and contact.separates:
                 tractions = face.law.tractions(x, face.history)
@@ -165,7 +168,7 @@ class ContactEventPrediction:
         x = self._sequence.positions(length)
         tension = any(np.any(N + np.einsum("ni,ni->n", slope, x[f][closed] - start) < 0)
                       for f, closed, N, start, slope in self._sticking)
-        return bool(combined(self._present[0].face.comm, tension, MPI.LOR))
+        return bool(combined(self._contacts[0].face.comm, tension, MPI.LOR))
 
     def closures(self, length: float) -> list[tuple] | None:
         """Return the gap closures predicted within a step.
@@ -174,8 +177,9 @@ class ContactEventPrediction:
             length: arc length of the step.
 
         Returns:
-            For each active contact the arguments `times`, `places`, `guessed` and `speeds` of `Approach.prepare`; None
-            if the prediction failed.
+            For each active contact a tuple of arrays for its n owned points: arc length of the gap closure, shape (n,);
+            position there, relative to the tool, shape (n, 2), length; mask of predicted contact forces, shape (n,);
+            derivative of the position before the closure, shape (n, 2), length. None if the prediction failed.
         """
         return list(zip(*self._sequence.closures(length), strict=True)) if self._known else None
 

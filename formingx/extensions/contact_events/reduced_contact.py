@@ -40,18 +40,20 @@ class StatusSearch:
     """Limits and tolerances of the active-set search for contact statuses that satisfy Coulomb's law.
 
     Attributes:
-        all_at_once: number of trials in which all statuses that violate the law change; later one changes at a time.
-        tries: maximum number of status sets that are tried.
-        negligible: fraction of the largest rate of force or motion below which a rate is negligible.
+        simultaneous_trials: number of trials in which all statuses that violate the law change; later one changes at a
+            time.
+        max_trials: maximum number of status sets that are tried.
+        negligible_rate: fraction of the largest rate of force or motion below which a rate is negligible.
         comparison_length: arc length by which rates of forces are multiplied to compare them with forces.
-        limit: relative distance from the Coulomb limit mu N, or from N = 0, below which a force counts as on it.
+        limit_tolerance: relative distance from the Coulomb limit mu N, or from N = 0, below which a force counts as on
+            it.
     """
 
-    all_at_once: int = 6
-    tries: int = 60
-    negligible: float = 1e-9
+    simultaneous_trials: int = 6
+    max_trials: int = 60
+    negligible_rate: float = 1e-9
     comparison_length: float = 1e-4
-    limit: float = 1e-6
+    limit_tolerance: float = 1e-6
 
 
 _SEARCH = StatusSearch()
@@ -66,7 +68,8 @@ class ToolFrame(NamedTuple):
         normal: unit normals, pointing into the tool, shape (m, 2).
         tangent: unit tangents of the tool, shape (m, 2).
         curvature: curvatures of the tool, shape (m,), 1/length.
-        beyond: penetration for the present contact force less the actual penetration, shape (m,), length.
+        beyond: depth in the tool at which the contact law gives the current force, minus the depth of the point, shape
+            (m,), length.
     """
 
     normal: np.ndarray
@@ -76,15 +79,16 @@ class ToolFrame(NamedTuple):
 
 
 class Points:
-    """Contact points of all ranks with known compliance, the motion of the body under unit forces at these points.
+    """Contact points of all ranks whose compliance is known: the motion of the body under unit forces at these points.
 
-    Each unit force contributes -1 to one component (r or z) of the residual F at one point.
+    Each unit force contributes -1 to one component (r or z) of the residual F at one point. m is the number of these
+    points, n the number of all contact points that this rank owns.
 
     Args:
         faces: the active `FaceContact` objects.
         n: number of locally owned unknowns of the fields, the first entries of x.
         size: number of locally owned entries of x.
-        response: linearised response of the body to contact forces.
+        response: `Response`, which solves for the motion of the body under forces by the stored LU factors.
 
     Attributes:
         point_ids: (rank, face, point) of each of the m points.
@@ -140,7 +144,11 @@ class Points:
 
     @cached_property
     def _properties(self) -> np.ndarray:
-        """Properties of the n owned points of all faces: those of the C function `frame`, shape (n, 7)."""
+        """Properties of the n owned points of all faces that the C function `frame` reads, shape (n, 7).
+
+        The columns are friction, elastic slip, adhesion, force over traction, half-width theta of the ramp, shift of
+        the distance and penalty.
+        """
         found = np.empty((self.starts[-1], 7))
         for face, rows in zip(self._faces, self.of_faces(found)):
             law = face.law
@@ -151,7 +159,7 @@ class Points:
 
     @cached_property
     def sticks(self) -> np.ndarray:
-        """Mask of those of the n owned points of all faces that never slide, shape (n,)."""
+        """Mask of the points that never slide, shape (n,) for the n owned points of all faces."""
         return self._properties[:, 0] >= FAR
 
     def of_faces(self, values: np.ndarray) -> list[np.ndarray]:
@@ -188,19 +196,24 @@ class Points:
         among[self._rows] = values[self._mine]
 
     def _located(self, point_ids: Sequence[tuple[int, int, int]]) -> tuple[Any, np.ndarray]:
-        """Return the indices of owned points in the list `point_ids`, and their numbers among those of all faces."""
+        """Return the indices of the owned points in a list, and their numbers among the owned points of all faces.
+
+        point_ids: (rank, face, point) of each point.
+        """
         ids = np.array(point_ids, dtype=int).reshape(-1, 3)
         mine = slice(None) if self._comm.size == 1 else np.flatnonzero(ids[:, 0] == self._comm.rank)
         return mine, np.array(self.starts)[ids[mine, 1]] + ids[mine, 2]
 
     def motion_to_targets(self, positions: np.ndarray, place: np.ndarray, near: ToolFrame) -> np.ndarray:
-        """Return the motion that takes the m points to target positions along, and to their contact depth normal to
-        tools.
+        """Return the motion that takes the m points of known compliance to their target positions.
+
+        The tangential motion leads to `place`. The normal motion leads to the depth at which the contact law gives the
+        current force.
 
         Args:
-            positions: present positions of the owned points relative to their tools, shape (n, 2), length.
-            place: target positions of the m points, whose tangential components count, shape (m, 2), length.
-            near: geometry of the tools at the m points.
+            positions: positions of the n owned contact points relative to their tools, shape (n, 2), length.
+            place: target positions of the m points along their tools, shape (m, 2), length.
+            near: geometry of the tools at the m points, with the missing depth.
 
         Returns:
             Motion, shape (m, 2), length.
@@ -209,14 +222,15 @@ class Points:
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
     def tool_frame(self, positions: np.ndarray, force: np.ndarray) -> ToolFrame:
-        """Return the geometry of the tools at the m points.
+        """Return the geometry of the tools at the m points of known compliance.
 
         Args:
-            positions: positions of the owned points relative to their tools, shape (n, 2), length.
-            force: present contact forces in F at the m points, shape (m, 2), which give the depth `ToolFrame.beyond`.
+            positions: positions of the n owned contact points relative to their tools, shape (n, 2), length.
+            force: contact forces at the m points, with the sign and scale of the residual F, shape (m, 2).
 
         Returns:
-            Normals, tangents and curvatures, and the penetrations that are missing for the forces.
+            Normals, tangents and curvatures. Also the depth at which the contact law gives these forces, minus the
+            depth of the points.
         """
         k, own = len(self._rows), force[self._mine]
         if self._profiles is None:
@@ -230,8 +244,11 @@ class Points:
 
     @cached_property
     def _profiles(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Pieces of the profiles of all tools, shape (pieces, 9), and for each of the n owned points the first piece of
-        its tool, their number and that of lines, shape (n, 3). None if a law does not use the profile of its tool."""
+        """Profiles of all tools, or None if a contact law does not use the profile of its tool.
+
+        The first array has their pieces (lines and arcs), shape (pieces, 9). The second has for each of the n owned
+        points the row of the first piece of its tool, the number of pieces and the number of lines, shape (n, 3).
+        """
         tools = [face.law.profile for face in self._faces]
         if None in tools:
             return None
@@ -272,7 +289,7 @@ class Points:
         """Return the motion of the n owned points of all faces under contact forces at the m points.
 
         Args:
-            forces: contact forces of sign -1, shape (m, 2).
+            forces: contact forces, subtracted from the residual F, shape (m, 2).
 
         Returns:
             Motion relative to the tools, shape (n, 2), length.
@@ -285,11 +302,13 @@ class Points:
 
         Args:
             u: motion dx of the points if the contact forces did not change, shape (m, 2), length.
-            status: contact statuses, shape (m,).
-            near: geometry of the tools.
-            force: present contact forces, shape (m, 2).
-            to: motion to the target positions of sticking points before their elastic slip g_s T/(mu N), shape (m, 2),
-                length. Sliding points are moved to the surface of their tools.
+            status: contact statuses, shape (m,): -1 or 1 for the sense of sliding, 0 sticking, 2 open
+                (`ContactStatus`).
+            near: geometry of the tools at the m points.
+            force: current contact forces, shape (m, 2).
+            to: motion of sticking points to the positions at which their tangential force is 0, shape (m, 2), length;
+                an elastic slip g_s T/(mu N) is added. For sliding points the motion to the surface of their tools.
+                g_s is `elastic_slip`, N and T are the normal and tangential force.
 
         Returns:
             New forces F; change of force beyond the stiffness S in the factorised tangent, dF - S dx; shape (m, 2)
@@ -309,9 +328,9 @@ class Points:
 
         Args:
             u: velocity of the points along the tangent of the path, shape (m, 2), length per arc length.
-            status: first statuses, shape (m,).
-            near: geometry of the tools.
-            force: present contact forces, shape (m, 2).
+            status: first statuses, shape (m,): -1 or 1 for the sense of sliding, 0 sticking, 2 open (`ContactStatus`).
+            near: geometry of the tools at the m points.
+            force: current contact forces, shape (m, 2).
 
         Returns:
             Rates of the forces F, shape (m, 2); their part beyond the stiffness S in the factorised tangent, dF - S dx,
@@ -319,7 +338,7 @@ class Points:
         """
         slack = (status != ContactStatus.FREE) & ~self._pulls
         F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]
-        slack &= np.abs(N).max(initial=0.0) * _SEARCH.limit >= N
+        slack &= np.abs(N).max(initial=0.0) * _SEARCH.limit_tolerance >= N
         given = *self._given(near), address(u), address(force), address_of_integers(status), _ADDRESS
         for found in (np.array(status, dtype=int), np.where(slack, ContactStatus.FREE, status).astype(int)):
             if compiled().rates(*given, address_of_integers(found), address(F), address(outside)):
@@ -331,9 +350,10 @@ class Points:
         """Return the arc length after which a contact status changes first, with forces linear in the arc length.
 
         Args:
-            status: contact statuses, shape (m,).
-            near: geometry of the tools.
-            force: present contact forces, shape (m, 2).
+            status: contact statuses, shape (m,): -1 or 1 for the sense of sliding, 0 sticking, 2 open
+                (`ContactStatus`).
+            near: geometry of the tools at the m points.
+            force: current contact forces, shape (m, 2).
             rate: derivatives of the forces with respect to arc length, shape (m, 2).
 
         Returns:
@@ -348,7 +368,11 @@ class Points:
         return time, after
 
     def _given(self, near: ToolFrame) -> tuple:
-        """Return the arguments for the C structure `Points` (`compiled_contact`)."""
+        """Return the arguments of the C functions that describe the m points and their tools.
+
+        They are m, and addresses of friction, adhesion, stiffness S, compliance C, normals and curvatures. near: tool
+        geometry at the m points.
+        """
         return (len(self.friction), address(self.friction), address(self._pulls), address(self._S), address(self._C),
                 address(near.normal), address(near.curvature))
 

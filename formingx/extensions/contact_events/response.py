@@ -15,7 +15,7 @@ from ...solve.state import State
 class Response:
     r"""Response of the unknowns x and the control to contact forces, linearised at an accepted state.
 
-    For right-hand sides E it is
+    The linearised equations are K dx = E, with right-hand sides E such as unit forces. The response to E is
 
     .. math:: \Delta x = V - \dot x \, (n \cdot V), \qquad \Delta\lambda = - \dot\lambda \, (n \cdot V), \qquad
               V = K^{-1} E
@@ -51,14 +51,14 @@ class Response:
             Changes of x, locally owned rows, shape (n, m), and of the control, shape (m,). The m columns run over the
             points of all ranks and their components. None without valid factors.
         """
-        return self._solve(unit_forces(self._problem, self._problem.present, chosen)) if self.is_valid else None
+        return self._solve(unit_forces(self._problem, self._problem.active_contacts, chosen)) if self.is_valid else None
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
         """Return one modified Newton correction of (x, control) towards equilibrium with given contact forces.
 
         Args:
-            x: unknowns at the present iterate, locally owned entries, shape (n,).
-            control: load parameter (control) of the present iterate, dimensionless.
+            x: unknowns at the current iterate, locally owned entries, shape (n,).
+            control: load parameter (control) of the current iterate, dimensionless.
             forces: for each face, contact forces at its points in the residual F, shape (n, 2). NaN where the contact
                 law gives the force.
 
@@ -70,11 +70,11 @@ class Response:
             return None
         self._x.array_w[:] = x
         try:
-            for face, given in zip(self._problem.present, forces, strict=True):
+            for face, given in zip(self._problem.active_contacts, forces, strict=True):
                 face.apply(given)
             self._problem.residual(self._x, control, self._F)
         finally:
-            for face in self._problem.present:
+            for face in self._problem.active_contacts:
                 face.apply(None)
         left = self._F.array_r.copy()
         left[self._problem.constrained] = 0.0
@@ -82,9 +82,12 @@ class Response:
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
 
     def _solve(self, E: Array) -> tuple[Array, Array] | None:
-        """Return the responses of x, shape (n, m), and of the control, shape (m,), to right-hand sides E, shape (n, m).
+        """Return the responses of x, shape (n, m), and of the control, shape (m,), to changes E of the residual.
+
+        E: m right-hand sides of the system with the tangent K, as columns, shape (n, m). The result is None if K,
+        updated for a few contact points, is singular.
         """
-        V = self._newton.solve_ahead(E)
+        V = self._newton.solve_one_sided(E)
         if V is None:
             return None
         along = combined(self._problem.comm, self._normal @ V)

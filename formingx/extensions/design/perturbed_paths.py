@@ -186,7 +186,7 @@ class _PerturbedPaths:
         n = self.problem.n_owned
         for face, closing, *others in zip(self.problem.contacts, self._closing,
                                           *(run.problem.contacts for run in self.runs)):
-            if face.present:
+            if face.active:
                 face.keep_open(closing)
                 free = ~face.law.touching(face.positions(state.x[:n], state.control), face.history)
                 for perturbed in others:
@@ -206,7 +206,7 @@ class _PerturbedPaths:
         """
         history, law, n = face.history, face.law, self.problem.n_owned
         no_points = np.zeros(len(face.points), dtype=bool)
-        if history is None or not law.has_friction or not face.present:
+        if history is None or not law.has_friction or not face.active:
             return no_points
         distance = law.distance(face.positions(state.x[:n], state.control))
         newly_closed = (history.distance <= -law.theta) & (distance > -law.theta)
@@ -232,7 +232,7 @@ class _PerturbedPaths:
         """
         n = self.problem.n_owned
         for number, face in enumerate(self.problem.contacts):
-            if not face.law.has_history or not face.present:
+            if not face.law.has_history or not face.active:
                 continue
             base = state.history_variables[self.problem.histories.index(face)]
             free = base.history.distance <= -face.law.theta

@@ -134,7 +134,7 @@ class PerturbedRun:
         forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
         F = self.residual(base_residual)[: self.problem.n_owned]
         unit = forms.stress * forms.volume / forms.length
-        for face in self.problem.present:
+        for face in self.problem.active_contacts:
             touching = face.rule.dofs[face.touching(fields, self.control)]
             for c in range(len(face.unbalanced)):
                 numbers = np.unique(touching[:, c::len(face.unbalanced)])

@@ -322,7 +322,7 @@ def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, 
     u = body.displacements()
     for touch, contact, conductance in tool_contacts:
         depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.tool_displacement(control))
-        touch.conductance[:] = conductance * (contact.present & (depth > -_CONTACT_DISTANCE * contact.thickness))
+        touch.conductance[:] = conductance * (contact.active & (depth > -_CONTACT_DISTANCE * contact.thickness))
 
 
 def _finer_elements(scene: Any, times: float, duration: float) -> str:

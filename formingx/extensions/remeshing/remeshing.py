@@ -221,7 +221,7 @@ def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
         record.segments.pop()                                # no state on the new mesh: the path ends before it
         raise
     if segment.problem.has_kinks:
-        segment.curve.look_ahead(start)
+        segment.curve.update_path_tangent(start)
     record.counts.iterations += segment.curve.spent()
     name, value = stepping["until"]
     record.complete_step(StepControl(**step | {"length": min(step["length"], 4 * first["length"])}),

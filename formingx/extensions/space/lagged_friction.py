@@ -12,9 +12,9 @@ g_s.
 
 The pressure N_0 is constant during the Newton iterations of a step, which therefore converge. At first N_0 is the
 pressure at the last accepted state, extrapolated along the tangent of the path. Then the step is solved again with the
-pressure that was found, until both agree (`StepLimits.pressure_difference`). N_0 is 0 for a point whose gap has closed
-since the last accepted state. Steps are short, so that the pressure changes little in each of them
-(`StepLimits.pressure_change`).
+pressure that was found, until both agree (`StepLimits.max_pressure_difference`). N_0 is 0 for a point whose gap has
+closed since the last accepted state. Steps are short, so that the pressure changes little in each of them
+(`StepLimits.max_pressure_change`).
 
 Within a step a point in contact carries tension as well as pressure, so that Newton's method meets no kink. Points in
 tension separate at the end of the step.
@@ -122,7 +122,7 @@ class LaggedFriction(LaggedStick):
         """
         return np.asarray(self.k * np.maximum(history.distance, 0.0))
 
-    def pressure_ahead(self, old: ContactHistory) -> np.ndarray:
+    def friction_pressure(self, old: ContactHistory) -> np.ndarray:
         """Return the contact pressure N_0 that limits friction during the next step, in which it is constant.
 
         The positions `ContactHistory.closure` store it: N_0 is the penalty times their depth in the tool. It is at most
@@ -145,7 +145,7 @@ class LaggedFriction(LaggedStick):
     def closure_at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
         """Return the positions, to be stored as `ContactHistory.closure`, whose depth in the tool encodes a pressure.
 
-        Their depth is the pressure over the penalty, to first order. `pressure_ahead` then limits friction by this
+        Their depth is the pressure over the penalty, to first order. `friction_pressure` then limits friction by this
         pressure.
 
         Args:
@@ -189,7 +189,7 @@ class LaggedFriction(LaggedStick):
             before = np.cos(sense[rows, None]) * basis[0] + np.sin(sense[rows, None]) * basis[1]
             slides &= (sense[rows] == 0) | (np.einsum("ni,ni->n", before, g) > 0)
         way = np.where(slides[:, None], g, 0.0) / np.maximum(size, 1e-300)[:, None]
-        stiff = self.mu * self.pressure_ahead(old)[rows] / np.where(slides, size, self.elastic_slip)
+        stiff = self.mu * self.friction_pressure(old)[rows] / np.where(slides, size, self.elastic_slip)
 
         def stiffness() -> np.ndarray:
             """Return the derivative of the tractions with respect to the positions, shape (n, 3, 3), stress/length."""

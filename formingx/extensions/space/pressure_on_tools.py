@@ -78,7 +78,7 @@ class PressureOnTools:
             function.x.array[:] = 0
         self._displacement.x.array[:] = surface.length * surface.w.x.array
         for face in surface.faces:
-            if face.present and not face.contact.sticks and face.history is not None:
+            if face.active and not face.contact.sticks and face.history is not None:
                 rows, distances = face.law.contact_distances(face.positions(fields, control), face.history)
                 pressure = face.law.pressure(face.history)[rows]
                 sliding = np.column_stack([np.ones(len(rows)), pressure, np.zeros(len(rows))])

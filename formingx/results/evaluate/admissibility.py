@@ -113,7 +113,7 @@ class AdmissibilityCheck:
         with self._problem.state_context(state):
             edges, found = self._outline.edges(), list[Finding]()
             lengths = _lengths(edges)
-            for contact in self._problem.present:
+            for contact in self._problem.active_contacts:
                 error = _force_error(contact, state, self._images)
                 if error > WARNED_ERROR:
                     name = contact.contact.label
@@ -156,7 +156,7 @@ class AdmissibilityCheck:
                 yield (f"the body did not follow the tool of {deep.name!r}: contact points are {deep.depth:.4g} deep in"
                        f" it, {100 * deep.ratio * _LIMITS.penetration:.2g} % of the remaining wall: give Contact a"
                        f" penalty of {50 * deep.ratio * deep.contact.contact.penalty:.1g}")
-            for contact in problem.present:
+            for contact in problem.active_contacts:
                 error = _force_error(contact, state, self._images)
                 if error > LARGE_ERROR and resultants.penetration(
                         contact, state.x, state.control) > NEGLIGIBLE * contact.thickness:
@@ -185,7 +185,7 @@ class AdmissibilityCheck:
         a, b, middle = edges.transpose(1, 0, 2)
         slopes = np.linalg.norm([4 * middle - 3 * a - b, a - 4 * middle + 3 * b], axis=-1)
         for contact, face in zip(self._problem.contacts, self._faces):
-            if not contact.present:
+            if not contact.active:
                 continue
             allowed = _LIMITS.depth * np.maximum(contact.thickness, lengths)
             if on_face:
@@ -211,7 +211,7 @@ class AdmissibilityCheck:
         if self._problem.scene.kinematics.components < 3:
             return
         with self._problem.state_context(state) as problem:
-            for contact in problem.present:
+            for contact in problem.active_contacts:
                 x = contact.positions(state.x, state.control)
                 depth, place = contact.law.distance(x), x + contact.tool_displacement(state.control)
                 rows = gathered(contact.comm, np.column_stack([depth / allowed(contact), depth, place]))
@@ -231,7 +231,7 @@ class AdmissibilityCheck:
         """
         weight, reference = self._problem.scene.kinematics.weight, self._outline.reference_edges
         for contact, face in zip(self._problem.contacts, self._faces):
-            if not contact.present or contact.contact.points != "nodes" or not face.any():
+            if not contact.active or contact.contact.points != "nodes" or not face.any():
                 continue
             depth = _depths(contact, edges[face], state).max(1)
             grown = lengths[face] / self._reference_lengths[face]

@@ -233,7 +233,7 @@ class EnergyBalance:
                     force = slope = 0.0
                 elif item in scene.contacts:
                     together = [scene.items[k] for k in scene.same_tool(i)]
-                    tools = [c for c in p.present if c.contact in together]
+                    tools = [c for c in p.active_contacts if c.contact in together]
                     force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.travel_vector)
                                  for c in tools)
                     slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ c.contact.travel_vector)
@@ -268,7 +268,7 @@ class EnergyBalance:
         with self._problem.state_context(state) as problem:
             x, control = state.x[: problem.n_owned], state.control
             return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _RAMP_EDGE)
-                              for c in problem.present]) > 0
+                              for c in problem.active_contacts]) > 0
 
     def _friction(self, a: Any, b: Any) -> float:
         """Return the energy that friction dissipates on the body as modelled in the step from state a to state b.
@@ -280,7 +280,7 @@ class EnergyBalance:
         if a.setting != b.setting or not contacts:
             return lost
         with problem.state_context(a):
-            for c in (c for c in contacts if c in problem.present):
+            for c in (c for c in contacts if c in problem.active_contacts):
                 before[c] = c.positions(a.x[: problem.n_owned], a.control), c.history, _friction_of(c, a, problem)
         with problem.state_context(b):
             for c, (x, history, T) in before.items():
@@ -308,7 +308,8 @@ class EnergyBalance:
     def _bonds(self, state: Any) -> float:
         """Return the energy stored in the contacts with adhesive tools, on the body as modelled, in a state."""
         with self._problem.state_context(state) as p:
-            return sum(resultants.energy(c, state.x[: p.n_owned], state.control) for c in p.present if c.law.adhesive)
+            return sum(resultants.energy(c, state.x[: p.n_owned], state.control)
+                       for c in p.active_contacts if c.law.adhesive)
 
     def _sum(self, values: Any) -> float:
         """Return the sum of an array, or of a number, over all entries and ranks; collective."""

@@ -1,0 +1,60 @@
+"""History variables of the points of a contact face, and their arrays in a file."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..errors import InputError
+from ..physics.contact_law import ContactHistory
+
+
+class FaceHistory(NamedTuple):
+    """History variables of the points of a face at the last accepted state.
+
+    Attributes:
+        history: history variables of the contact law.
+        newly_closed: mask of the points that came into contact in the step to this state, shape (n,).
+        penalty: penalty with which the state was solved for, over the reference penalty, shape (n,)
+            (`Contact.present_area`).
+    """
+
+    history: ContactHistory
+    newly_closed: np.ndarray
+    penalty: np.ndarray
+
+    def saved(self, points: np.ndarray, comm: Any) -> dict[str, np.ndarray]:
+        """Return the history variables of all ranks, with the points to which they belong; collective.
+
+        Args:
+            points: reference positions of the n locally owned points, shape (n, components), length.
+            comm: MPI communicator of the face.
+
+        Returns:
+            {name: array}, the same on all ranks: "points", the fields of `ContactHistory`, and the other fields.
+        """
+        parts = comm.allgather((points, *self.history, self.newly_closed, self.penalty))
+        names = ("points", *self.history._fields, "newly_closed", "penalty")
+        return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
+
+    @classmethod
+    def loaded(cls, data: dict[str, Any], points: np.ndarray, start: ContactHistory, near: float) -> FaceHistory:
+        """Return the history variables of the locally owned points from the arrays of `saved`.
+
+        Args:
+            data: the arrays, such as the contents of a checkpoint.
+            points: reference positions of the n points, shape (n, components), length.
+            start: history variables of these points in the reference configuration, for the shapes of arrays.
+            near: tolerance of reference positions, length.
+
+        Raises:
+            InputError: no saved point has the reference position of one of the points.
+        """
+        from scipy.spatial import cKDTree
+        away, rows = cKDTree(np.array(data["points"]).reshape(-1, points.shape[1])).query(points)
+        if np.any(away > near):
+            raise InputError("checkpoint: a contact point of the scene is not in it: it belongs to another mesh")
+        history = ContactHistory(*(np.array(data[name], dtype=float)[rows].reshape(getattr(start, name).shape)
+                                   for name in ContactHistory._fields))
+        return cls(history, np.array(data["newly_closed"], dtype=bool)[rows], np.array(data["penalty"])[rows])

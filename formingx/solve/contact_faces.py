@@ -1,0 +1,107 @@
+"""Interfaces of faces in contact for the solver: contact points, their law in an iteration, their tractions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, Protocol, TypeAlias
+
+import numpy.typing as npt
+
+Array: TypeAlias = npt.NDArray[Any]
+
+
+class Tractions(Protocol):
+    """Tractions of the contact law at n points with c components.
+
+    Attributes:
+        force: tractions, shape (n, c), stress.
+        sense: direction of sliding along the tangent of the tool, 1 or -1; 0 for other points; shape (n,).
+        stiffness: derivative of `force` with respect to the position of its point, shape (n, c, c), stress/length.
+        status: `ContactStatus` of each point, shape (n,).
+    """
+
+    force: Array
+    sense: Array
+
+    @property
+    def stiffness(self) -> Array: ...
+
+    @property
+    def status(self) -> Array: ...
+
+
+class Increment(Protocol):
+    """Contact law at n locally owned points of a face with c components, linearised in each Newton iteration."""
+
+    @property
+    def ramp(self) -> float:
+        """Half-width theta of the contact ramp, length.
+
+        The contact stiffness grows from zero as the distance, positive inside the tool, goes from -theta to theta.
+        """
+
+    @property
+    def status(self) -> Array:
+        """`ContactStatus` of each point in the last linearisation, shape (n,)."""
+
+    @property
+    def newly_closed(self) -> Array:
+        """Mask of points that are closed now but were open at the start of Newton's method, shape (n,)."""
+
+    def last_tractions(self, points: Array) -> tuple[Array, Array]:
+        """Return (tractions, stiffnesses) of m points in the last linearisation, shapes (m, c) and (m, c, c).
+
+        points: numbers of the points. Tractions are stresses, stiffnesses stress/length.
+        """
+
+    def predicted(self, motion: Array) -> Tractions:
+        """Return the tractions at all points after a further motion, to first order in distances and slips.
+
+        motion: motion relative to the tool since the last linearisation, shape (n, c), length.
+        """
+
+    def law_at(self, points: Array) -> Callable[[Array], Tractions]:
+        """Return a function that maps further motions of m points, shape (m, c), length, to their tractions.
+
+        A motion is relative to the tool, since the last linearisation. points: numbers of the points, shape (m,).
+        """
+
+    def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
+        """Return a function that maps further motions of m points, shape (m, c), length, to (depth, path).
+
+        A motion is relative to the tool, since the last linearisation. With the half-width theta of the ramp, the depth
+        is 0 at the signed distance -theta and 1 at theta, shape (m,). The path is the normal times 2 theta, shape (m,
+        c), length; 0 for points that slide, adhere or have no friction.
+        """
+
+    def expect(self, points: Array, sense: Array) -> None:
+        """Set the direction of sliding, `sense`, shape (n,), that the next iteration assumes at a mask of points."""
+
+
+class ContactFace(Protocol):
+    """Face of the body in contact, with n locally owned points.
+
+    Attributes:
+        points: reference positions of the contact points, shape (n, c).
+        rule: quadrature rule of the face (`formingx.contact.rule.Rule`).
+    """
+
+    points: Array
+    rule: Any
+
+    @property
+    def increment(self) -> Increment:
+        """Contact law at the points during one run of Newton's method, which begins with `ActiveSet.begin`."""
+
+    @property
+    def scale(self) -> Array:
+        """Factor from the traction of each point to its force in the dimensionless residual F, shape (n,), 1/stress."""
+
+    def apply(self, forces: Array | None) -> None:
+        """Set contact forces that act in F in place of the contact law, shape (n, c); None: the law acts."""
+
+    def relative_motion(self, dx: Array, step: Array | float) -> Array:
+        """Return the motion of the points relative to their tool, shape (points, c), length, in an update.
+
+        dx: update of the unknowns, locally owned entries; several are columns. step: update of the control.
+        """
