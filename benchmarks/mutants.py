@@ -111,7 +111,7 @@ MUTANTS = [Mutant(*row) for row in [
      "self.dissipated += self._sum(pull * dx)", "details"),
     ("solve/snap_through.py", "0.5 * (max(self._sum(self._pull * dx), 0.0) +", "0.5 * (self._sum(self._pull * dx) +",
      "details"),
-    ("solve/snap_through.py", "if self._goes_back(self._old, state) or was_passed(", "if False and was_passed(",
+    ("solve/snap_through.py", "if self._moves_back(self._old, state) or was_passed(", "if False and was_passed(",
      "bottle"),
     ("solve/branches.py", "sense = -1 if curve.progress(last, state) < 0 else 1", "sense = 1", "stability"),
     ("results/evaluate/admissibility.py", "penetration: float = 0.15", "penetration: float = 0.45",

@@ -84,14 +84,14 @@ class Increment:
     @property
     def status(self) -> np.ndarray:
         """`ContactStatus` of each point (open, sticking, sliding) in the last computed tractions, shape (n,)."""
-        return self._now[1].status
+        return self._last_result[1].status
 
     @property
     def newly_closed(self) -> np.ndarray:
         """Mask of the points that are in contact now and were open at the start of the increment, shape (n,)."""
         if self._touched is None:
-            return np.zeros(len(self._now[0]), dtype=bool)
-        return self._law.touching(self._now[0], self._history) & ~self._touched
+            return np.zeros(len(self._last_result[0]), dtype=bool)
+        return self._law.touching(self._last_result[0], self._history) & ~self._touched
 
     @property
     def ramp(self) -> float:
@@ -107,7 +107,7 @@ class Increment:
         Returns:
             Tractions, shape (m, c), stress; their derivatives by the position, shape (m, c, c), stress/length.
         """
-        return self._now[1].force[points], self._now[1].stiffness[points]
+        return self._last_result[1].force[points], self._last_result[1].stiffness[points]
 
     def predicted(self, motion: np.ndarray) -> Tractions:
         """Return the tractions after a further motion of all points, with distances and slips predicted to first order.
@@ -118,7 +118,7 @@ class Increment:
         Returns:
             Tractions of the law, linearised at the predicted distances and slips.
         """
-        x, predicted = self._now[0], self._predicted_motion(slice(None))
+        x, predicted = self._last_result[0], self._predicted_motion(slice(None))
         return self._law.tractions(x, self._history, None, predicted(motion))
 
     def law_at(self, points: np.ndarray) -> Callable[[np.ndarray], Tractions]:
@@ -132,7 +132,7 @@ class Increment:
             their `Tractions`, linearised at the distances and slips predicted to first order.
         """
         history = self._history and ContactHistory(*(part[points] for part in self._history))
-        law, x, predicted = self._law.part(points), self._now[0][points], self._predicted_motion(points)
+        law, x, predicted = self._law.part(points), self._last_result[0][points], self._predicted_motion(points)
         return lambda motion: law.tractions(x, history, None, predicted(motion))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
@@ -150,7 +150,7 @@ class Increment:
             c), length; 0 for points that slide, adhere or have no friction.
         """
         assert self._before is not None
-        width, x = 2 * self._law.theta, self._now[0][points]
+        width, x = 2 * self._law.theta, self._last_result[0][points]
         before = Motion(*(part[points] for part in self._before))
         law = self._law.part(points)
         sticks = np.reshape(law.has_friction and not law.adhesive and law.sticks, (-1, 1))
@@ -166,7 +166,7 @@ class Increment:
         the distances and slips that the contact law needs.
         """
         assert self._before is not None
-        before, x = Motion(*(part[points] for part in self._before)), self._now[0][points]
+        before, x = Motion(*(part[points] for part in self._before)), self._last_result[0][points]
         return lambda motion: before.to(x + motion)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
@@ -179,7 +179,7 @@ class Increment:
         self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
 
     @property
-    def _now(self) -> tuple[np.ndarray, Tractions]:
+    def _last_result(self) -> tuple[np.ndarray, Tractions]:
         """Positions and tractions of the last call of `tractions` or `linearise`."""
         assert self._last is not None, "call `tractions` first"
         return self._last

@@ -18,12 +18,12 @@ class Tooling(NamedTuple):
 
     Attributes:
         contacts: contacts in the order of the scene.
-        before: number of items of the scene that precede the contacts in `Scene.items`.
+        first: number of items of the scene that precede the contacts in `Scene.items`.
         length: length by which an amplitude is multiplied to give the travel of a tool, length.
     """
 
     contacts: list[Contact]
-    before: int
+    first: int
     length: float
 
     @classmethod
@@ -79,7 +79,7 @@ class Tooling(NamedTuple):
             return [0.0] * len(self.contacts)
         step_data = StepData(**setting)
         return [None if i in step_data.inactive else self.length * step_data.amplitude(i, control)
-                for i in range(self.before, self.before + len(self.contacts))]
+                for i in range(self.first, self.first + len(self.contacts))]
 
     def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:
         """Return the active tools with their displacements.

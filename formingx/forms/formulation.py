@@ -170,7 +170,7 @@ class Formulation(ControlledLoads):
         Returns:
             Temperatures at the last accepted state and, if it is known, at the state before, shape (1 or 2, cells, q).
         """
-        return np.asarray(self.temperature.now_and_before(terms.cells, terms.places))
+        return np.asarray(self.temperature.last_two_states(terms.cells, terms.places))
 
     def update_temperature(self) -> None:
         """Update the material constants to a changed temperature, with unchanged `length` and `stress`; collective.

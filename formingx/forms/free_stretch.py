@@ -36,7 +36,7 @@ class FreeStretch:
         stretch = fem.Function(fem.functionspace(forms.domain, element), name="free stretch")
         stretch.x.array[:] = 1.0
         self._cells = [forms.cells_of([name]) for name in expansion]
-        self._temperatures = partial(forms.temperature.now_and_before, places=basix.make_quadrature(cell, degree)[0])
+        self._temperatures = partial(forms.temperature.last_two_states, places=basix.make_quadrature(cell, degree)[0])
         laws = [(cells, partial(law.stretch, clamped=True)) for cells, law in zip(self._cells, expansion.values())]
         self._coefficient = TemperatureCoefficient(forms, stretch, laws, map(self._temperatures, self._cells))
         self.stretch = self._coefficient.at_time(forms.time)

@@ -85,7 +85,7 @@ class MaterialTerms:
                                                degree=self.forms.scene.quadrature_degree)
         return fem.Function(fem.functionspace(self.forms.domain, element))
 
-    def of_position(self, function: Any) -> fem.Function:
+    def position_coefficient(self, function: Any) -> fem.Function:
         """Evaluate a function of the reference position at the quadrature points of the energy.
 
         Args:
@@ -103,7 +103,7 @@ class MaterialTerms:
         found.interpolate(values, self.cells)
         return found
 
-    def of_temperature(self, function: Any) -> Any:
+    def temperature_coefficient(self, function: Any) -> Any:
         """Evaluate a function of the temperature at the quadrature points of the energy.
 
         Args:
@@ -129,7 +129,7 @@ class MaterialTerms:
         for coefficient in self._coefficients:
             coefficient.update(temperatures)
 
-    def of_mesh(self, expression: Any) -> Any:
+    def mesh_coefficient(self, expression: Any) -> Any:
         """Return a coefficient that is a UFL expression on the scene's mesh, if the fields live on this mesh.
 
         Args:

@@ -193,11 +193,11 @@ class MidSurfaceProbe(Probe):
         speed = np.hypot(*tangent.T)[:, None] * np.where(tangent[:, :1] > 0, 1.0, -1.0)
         self._ends = at, self._dofs_of(cells), _basis(element, 1, end[:, None].astype(float)) / speed
         self._meet = meet[self._mine]
-        both = self._at_ends(tangent / speed)[self._mine]
+        both = self._mean_over_elements(tangent / speed)[self._mine]
         self._mean_length = np.where(self._meet, np.hypot(*both.T), 1.0)[:, None]     # of the mean of unit vectors
         self._tangent = np.where(self._meet[:, None], both / self._mean_length, self._tangent)
 
-    def _at_ends(self, values: np.ndarray) -> np.ndarray:
+    def _mean_over_elements(self, values: np.ndarray) -> np.ndarray:
         """Return the mean of a vector over both elements at points where two elements meet; collective.
 
         values: vectors at the ends of this rank's elements that meet such a point, shape (ends, 2). The result has the
@@ -248,7 +248,8 @@ class MidSurfaceProbe(Probe):
         u, du = super()._local(values), np.einsum("kij,kij->ki", self._slopes, values)
         forms = self._problem.forms
         _, dofs, slopes = self._ends
-        both = self._at_ends(np.einsum("kj,kij->ki", slopes, forms.w.x.array[dofs]))[self._mine] / self._mean_length
+        means = self._mean_over_elements(np.einsum("kj,kij->ki", slopes, forms.w.x.array[dofs]))
+        both = means[self._mine] / self._mean_length
         du = np.where(self._meet[:, None], both, du)
         t = self._tangent + forms.length * du
         l1 = np.hypot(*t.T)

@@ -108,7 +108,7 @@ class StepData:
         """
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
-    def on_next_mesh(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[StepData, float]:
+    def transferred(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[StepData, float]:
         """Return step data and control that give the same values in the user's units on the next mesh of a run.
 
         Args:
@@ -121,7 +121,7 @@ class StepData:
             Step data and control on the next mesh.
         """
         ratio = [b / n for b, n in zip(before, now, strict=True)]
-        of_control = 1.0 if self.controlled is None else ratio[self.controlled]
+        control_ratio = 1.0 if self.controlled is None else ratio[self.controlled]
         return replace(self, base=[r * b for r, b in zip(ratio, self.base, strict=True)],
-                       rate=[r * b / of_control for r, b in zip(ratio, self.rate, strict=True)],
-                       mesh=self.mesh + 1), of_control * control
+                       rate=[r * b / control_ratio for r, b in zip(ratio, self.rate, strict=True)],
+                       mesh=self.mesh + 1), control_ratio * control

@@ -117,7 +117,7 @@ class Solid(Formulation):
 
     def _make_mesh(self) -> Any:
         scene = self.scene
-        self.bodies = _by_material(scene)
+        self.bodies = _bodies(scene)
         self.pressure_of = _colour(scene) if scene.model.pressure else {}
         return scene.mesh
 
@@ -207,7 +207,7 @@ class Solid(Formulation):
         return [(W, {}), *model.terms(J, p, modulus, self._eps)]
 
 
-def _by_material(scene: Any) -> list[tuple[Any, list[str]]]:
+def _bodies(scene: Any) -> list[tuple[Any, list[str]]]:
     """Return a list of (material, its layers); layers that share one material object form one body."""
     groups: dict[int, tuple[Any, list[str]]] = {}
     for name in scene.mesh.layers:
@@ -223,7 +223,7 @@ def _colour(scene: Any) -> dict[str, int]:
         return dict.fromkeys(mesh.layers, 0)
     topology = mesh.domain.topology
     topology.create_connectivity(2, 0)
-    groups = [names for _, names in _by_material(scene)]
+    groups = [names for _, names in _bodies(scene)]
     touches = []
     for names in groups:
         cells = np.concatenate([mesh.cells.find(mesh.layers[n]) for n in names])

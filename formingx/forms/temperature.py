@@ -30,7 +30,7 @@ class Temperature:
         self.time = self.time_before = 0.0
         self.limits = (-np.inf, np.inf)
 
-    def now_and_before(self, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
+    def last_two_states(self, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
         """Return the temperatures in cells, now and in the previous step if there is one.
 
         Args:

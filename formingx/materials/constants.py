@@ -69,8 +69,9 @@ class Varying(ABC):
 
         Args:
             fields: source of fields that the expression may use. `fields.X` is the reference position (UFL, shape
-                (2,)). `fields.of_position(f)` and `fields.of_temperature(f)` are coefficients with the values f(R, Z)
-                and f(T) at the quadrature points of the energy. The latter follows changes of the temperature.
+                (2,)). `fields.position_coefficient(f)` and `fields.temperature_coefficient(f)` are coefficients with
+                the values f(R, Z) and f(T) at the quadrature points of the energy. The latter follows changes of the
+                temperature.
 
         Returns:
             The constant (UFL scalar).
@@ -103,7 +104,7 @@ class OfPosition(Varying):
         return values(f"the constant {self!r}", self.function, dict(zip(axes(sample.domain), sample.points.T)))
 
     def expression(self, fields):
-        return fields.of_position(self)
+        return fields.position_coefficient(self)
 
     def __repr__(self) -> str:
         return getattr(self.function, "__qualname__", repr(self.function))
@@ -118,7 +119,7 @@ class OfTemperature(FunctionOfTemperature, Varying):
         return self(sample.temperature)
 
     def expression(self, fields):
-        return fields.of_temperature(self)
+        return fields.temperature_coefficient(self)
 
 
 def of_temperature(function: Callable) -> OfTemperature:
@@ -190,7 +191,7 @@ class OfMesh(Varying):
         return compiled.eval(sample.domain, sample.cells).ravel() if len(sample.cells) else np.zeros(0)
 
     def expression(self, fields):
-        return fields.of_mesh(self._expression)
+        return fields.mesh_coefficient(self._expression)
 
     def __repr__(self) -> str:
         return str(self._expression)

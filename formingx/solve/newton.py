@@ -207,23 +207,23 @@ class BorderedNewton:
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0
-        self._hurried = False
+        self._limited = False
         self._update: Update | None = None                  # of solutions, to a tangent that is not factorised
         self._modified = ModifiedNewton(self.settings)
 
     @contextlib.contextmanager
-    def in_a_hurry(self, hurried: bool) -> Iterator[None]:
+    def limited_settling(self, limited: bool) -> Iterator[None]:
         """Return a context in which the active set of contacts with history variables may change in few iterations
         only.
 
         Args:
-            hurried: True to allow `Newton.history_settling` iterations only; False to change nothing.
+            limited: True to allow `Newton.history_settling` iterations only; False to change nothing.
         """
-        self._hurried = hurried and self.problem.has_history
+        self._limited = limited and self.problem.has_history
         try:
             yield
         finally:
-            self._hurried = False
+            self._limited = False
 
     def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> bool:
         """Compute the tangent of the path at a solution of F = 0: the vector `b` = dx/dcontrol, with new factors.
@@ -380,7 +380,7 @@ class BorderedNewton:
         if active.returns >= settings.max_cycles:
             raise Failure("contact does not settle: the same points change between open, sticking and sliding"
                           " over and over", history)
-        most = min(self.tolerances.settling, settings.history_settling) if self._hurried else self.tolerances.settling
+        most = min(self.tolerances.settling, settings.history_settling) if self._limited else self.tolerances.settling
         settling = len(history) - min(active.found, settings.exempt_iterations) >= most
         if len(quiet) >= self.tolerances.iterations or settling:
             unsettled = settling and len(history) - active.changed < 3

@@ -149,7 +149,7 @@ class Run:
     @property
     def _is_released(self) -> bool:
         """True if the controlled quantity decreases towards 0, as a pressure that is released."""
-        return self.targets.of_control and abs(self.targets.until.value) < abs(self.targets.values[0])
+        return self.targets.is_control and abs(self.targets.until.value) < abs(self.targets.values[0])
 
     @property
     def states(self) -> list[State]:
@@ -259,7 +259,7 @@ class Run:
         limit = self.problem.limit
         bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
         earlier = None if self.problem.has_kinks else predictor.parabola_state(self.states, reach, self.curve.distance)
-        with self.curve.newton.in_a_hurry(length > self.settings.snap_through.lengths[0]):
+        with self.curve.newton.limited_settling(length > self.settings.snap_through.lengths[0]):
             if target is not None and quantity is not None:
                 new = self.curve.step_to(old, reach, quantity.equation(target.value), self._predictor, earlier, bend)
             elif end is not None:
@@ -411,7 +411,7 @@ class Run:
         """
         self.record.counts.iterations += self.curve.spent()
         found = diagnose(self.curve, self.states, why, attempt, pace,
-                         self.targets.until.value if self.targets.of_control and self._target_is_control else None)
+                         self.targets.until.value if self.targets.is_control and self._target_is_control else None)
         self.curve.spent()                                  # the diagnosis is not part of the run
         raise not_reached(self.record, self.states, self.targets, f"{why}.", found, hint)
 

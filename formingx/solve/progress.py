@@ -44,7 +44,7 @@ class RunTargets:
         self._ends = [target for target in (self.until, requested) if target is not None]
 
     @property
-    def of_control(self) -> bool:
+    def is_control(self) -> bool:
         """True if the last target is a value of the control, or of an amplitude that depends on the control."""
         return isinstance(self.quantity, Amplitude)
 
@@ -156,7 +156,7 @@ class RunTargets:
             return ""
         gained = self.gained()
         self._best = max(self._best, gained)
-        kept = 0.0 if self.of_control else 0.5
+        kept = 0.0 if self.is_control else 0.5
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             return ("the path turned back, away from the target; a crease at a singular corner (a clamped rim on a fine"
                     " mesh) can cause that")

@@ -226,7 +226,7 @@ class _Motion:
         last, new = self.state, replace(self.state, x=x, control=self.control)
         if self.problem.has_inverted_element(self._x, self.control) or limit and limit.passes_through(last, new):
             return self._reject()
-        if self._goes_back(last, new):                      # to the unstable state where the motion began
+        if self._moves_back(last, new):                      # to the unstable state where the motion began
             return self._reject()
         pull = self._drag.forces(x)
         most = np.clip(settings.distance_ratio * self.curve.moved(self._old, last), settings.min_distance,
@@ -265,7 +265,7 @@ class _Motion:
                 With history variables, the current position then counts as the equilibrium state.
         """
         try:
-            with self.curve.newton.in_a_hurry(True):        # after a failure, the viscous motion continues
+            with self.curve.newton.limited_settling(True):        # after a failure, the viscous motion continues
                 state = self.curve.solve(self.state.x, self.control, fixed(self.control), "jump", self.state)
         except Failure:
             if self.unbalanced > self._settings.equilibrium_force:
@@ -275,7 +275,7 @@ class _Motion:
                 raise
             state = self.curve.resume(self.state.x, self.control)
             state.kind, state.history = "jump", [Iteration(self.unbalanced, 0.0, 0.0)]
-        if self._goes_back(self._old, state) or was_passed(self.curve, self._passed, self._old, state):
+        if self._moves_back(self._old, state) or was_passed(self.curve, self._passed, self._old, state):
             self.settles, self.trial_force = False, 0.3 * self.unbalanced
             return None
         self._add_dissipation(self.state.x, state.x, np.zeros(len(state.x)))
@@ -283,7 +283,7 @@ class _Motion:
         state.jump = {"dissipated": self.dissipated * energy, "moved": self.curve.moved(self._old, state) * length}
         return state
 
-    def _goes_back(self, a: State, b: State) -> bool:
+    def _moves_back(self, a: State, b: State) -> bool:
         """Return True if the work of the controlled load from state a to state b has the sign opposite to `work_sign`.
         """
         return bool(self._work_sign) and self.curve.work(a, b) * self._work_sign < 0

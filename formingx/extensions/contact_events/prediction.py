@@ -109,7 +109,7 @@ class ContactEventPrediction:
         Returns:
             Arc length, at most `length`. None if the prediction failed; then the other methods also return None.
         """
-        found, sequence = self._to_enough_closures(length) if self._known else None, self._sequence
+        found, sequence = self._length_to_closures(length) if self._known else None, self._sequence
         while found is not None and found > LIMITS.min_length and any(
                 [c.cuts_tool(a, b)
                  for c, a, b in zip(self._contacts, sequence.positions(0.0), sequence.positions(found))]):
@@ -117,7 +117,7 @@ class ContactEventPrediction:
         self._known = found is not None
         return found
 
-    def _to_enough_closures(self, length: float) -> float | None:
+    def _length_to_closures(self, length: float) -> float | None:
         """Return the arc length, at most `length`, at which the allowed number of gaps of a face has closed.
 
         The prediction keeps points closed that stick at the start of the step. If such a point is in tension before a

@@ -316,7 +316,7 @@ class Points:
         """
         F, outside = np.empty(force.shape), np.empty(force.shape)
         good = compiled().forces_at_end(
-            *self._given(near), address(self.elastic_slip), address(near.beyond), address(u),
+            *self._arguments(near), address(self.elastic_slip), address(near.beyond), address(u),
             address_of_integers(status), address(force), address(to), _ADDRESS, address(F), address(outside))
         return (F, outside) if good else (force, np.full(force.shape, np.nan))
 
@@ -339,7 +339,7 @@ class Points:
         slack = (status != ContactStatus.FREE) & ~self._pulls
         F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]
         slack &= np.abs(N).max(initial=0.0) * _SEARCH.limit_tolerance >= N
-        given = *self._given(near), address(u), address(force), address_of_integers(status), _ADDRESS
+        given = *self._arguments(near), address(u), address(force), address_of_integers(status), _ADDRESS
         for found in (np.array(status, dtype=int), np.where(slack, ContactStatus.FREE, status).astype(int)):
             if compiled().rates(*given, address_of_integers(found), address(F), address(outside)):
                 return F, outside, found
@@ -361,13 +361,13 @@ class Points:
             change.
         """
         changed, after = np.zeros(2, dtype=int), np.array(status, dtype=int)
-        time = compiled().change(*self._given(near), address_of_integers(status), address(force), address(rate),
+        s = compiled().change(*self._arguments(near), address_of_integers(status), address(force), address(rate),
                                  _ADDRESS, address_of_integers(changed))
-        if time < np.inf:
+        if s < np.inf:
             after[changed[0]] = changed[1]
-        return time, after
+        return s, after
 
-    def _given(self, near: ToolFrame) -> tuple:
+    def _arguments(self, near: ToolFrame) -> tuple:
         """Return the arguments of the C functions that describe the m points and their tools.
 
         They are m, and addresses of friction, adhesion, stiffness S, compliance C, normals and curvatures. near: tool

@@ -333,7 +333,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
     new_scene = scene_on_new_mesh(mesh, StateTransfer.of(old, state))
     problem = Problem(new_scene)
     problem.limit.end_at_closures()
-    setting, control = old.setting.on_next_mesh(old.scales, problem.scales, state.control)
+    setting, control = old.setting.transferred(old.scales, problem.scales, state.control)
     curve = Curve(problem, tolerances)
     x = new_scene.state_transfer.unknowns(problem)
     problem.enter(setting, x, control)
