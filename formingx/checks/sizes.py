@@ -14,7 +14,6 @@ from ..materials.inflation import FreeInflation, Peak, first_peak
 from ..measures.targets import Target
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
-from ..results.evaluate.edges import EDGE_ANGLE
 from ..scene.contact_checks import OTHER_UNIT
 from ..scene.scene import Scene
 from ..solve.stage import Stage
@@ -32,6 +31,7 @@ _ABOVE_PEAK = 1.1          # pressure over the maximum of a spherical cap, which
 _REMAINING_PRESSURE = 0.8  # lowest pressure beyond the limit point of a tube over its maximum (tests/test_check.py)
 _BLOW_RATIO = 8.0          # largest blow ratio of bottles
 _MOULD_DEPTH = 0.5         # height of a wall over the opening: a mould is higher, a grip lower
+_CORNER_ANGLE = 10.0       # degrees by which a profile turns at a sharp corner
 _STIFFENS = "a material that stiffens (Gent, ArrudaBoyce, Yeoh, Ogden with an exponent above 2) does"
 
 
@@ -435,7 +435,7 @@ def _sharp_edges(body: Body) -> Found:
         pieces = contact.tool.pieces
         for a, b in zip(pieces, pieces[1:] + (pieces[:1] if contact.tool.closed else ())):
             turn = np.degrees((b.angles[0] - a.angles[1] + np.pi) % (2 * np.pi) - np.pi)
-            if turn > EDGE_ANGLE:                                # the solid is to the left: convex
+            if turn > _CORNER_ANGLE:                             # the solid is to the left: convex
                 yield Finding("warning", repr(contact),
                               f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
                               f" there are off by 1 to 3 %, depending on where nodes lie, and more elements"

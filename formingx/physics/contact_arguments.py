@@ -10,8 +10,8 @@ from ..values.temperature import FunctionOfTemperature
 MAX_DEGREE = 30
 """Largest degree of a quadrature rule: higher degrees are mistakes, and their points would fill the memory."""
 
-_MAX_POINTS = (MAX_DEGREE + 1) // 2
-"""Largest number of Gauss points on a facet: n points are exact to degree 2 n - 1."""
+_MAX_POINTS = 100
+"""Largest number of Gauss points on a facet. A ring that rolls on a compliant plate needs 16."""
 
 
 def coefficient(name: str, friction: Any) -> Any:
@@ -52,7 +52,7 @@ def contact_points(name: str, points: Any) -> str | int:
         The argument `points`.
 
     Raises:
-        InputError: `points` is neither "nodes" nor a number from 1 to 15.
+        InputError: `points` is neither "nodes" nor a number from 1 to 100.
     """
     if isinstance(points, str) and points == "nodes":
         return points
