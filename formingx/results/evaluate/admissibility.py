@@ -26,12 +26,12 @@ class AdmissibilityLimits:
             coarse blocks stay below 0.17.
         inverted_elements: largest fraction of the elements that have a point with J <= 0.
         allowed_elements: number of elements with J <= 0 that is allowed on any mesh, because corners are singular.
-        depth: largest depth of the boundary in a tool, over the sheet thickness or the length of the element edge,
-            whichever is larger.
+        depth: largest depth of the boundary in a tool, divided by the sheet thickness or, if it is larger, by the
+            length of the element edge.
         penetration: largest penetration of a contact point, over the deformed wall there. Beyond it the body did not
             follow the tool. Williams' plug on coarse elements reaches 0.051.
-        largest_energy_ratio: bound of the estimated relative error of a tool force: it is at most this number times the
-            fraction of the strain energy that penetration stores. It matters for a body that is pressed flat.
+        largest_energy_ratio: factor c of the bound c E/W of the estimated relative error of a tool force. Penetration
+            stores the energy E, the body the strain energy W. The bound matters for a body that is pressed flat.
     """
 
     volume: float = 0.25
@@ -103,8 +103,8 @@ class AdmissibilityCheck:
 
         Returns:
             The findings; empty if all penetrations are small. In a section a finding is a warning: penetration changes
-            a tool force by more than `Limits.warning_error`, or a face is too deep in a tool. In three dimensions it is
-            "serious": a contact point is too deep. Allowed is a tenth of the thickness (`CUT`).
+            a tool force by more than 0.2 % (`WARNED_ERROR`), or the face lies deeper in a tool than a tenth of the
+            thickness (`CUT`). In three dimensions a finding is "serious": a contact point lies deeper than that tenth.
         """
         if not self._solid:
             deepest = self._deepest_points(state, lambda contact: CUT * contact.thickness)
@@ -172,15 +172,18 @@ class AdmissibilityCheck:
     def _deepest(self, edges: np.ndarray, lengths: np.ndarray, state: State, on_face: bool) -> Iterator[Depth]:
         """Yield for each active tool of a section the deepest point of the boundary in it, if deeper than allowed.
 
-        Edges are examined whose ends and middle are so deep that a point between them may be too deep: no point of an
-        edge is farther from the nearest of the three than a quarter of the largest derivative of its parabola.
+        Only edges that may contain such a point are examined. An edge is a parabola x(s), 0 <= s <= 1. Each of its
+        points is nearer than max |dx/ds| / 4 to an end or to the middle, whose depths are known.
 
         Args:
             edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
             lengths: their lengths, shape (m,).
             state: the state.
             on_face: True to examine only the face that touches the tool; a tenth of the thickness (`CUT`) is allowed.
-                False to examine the whole boundary; `AdmissibilityLimits.depth` is allowed.
+                False to examine the whole boundary; the limit `AdmissibilityLimits.depth` is allowed.
+
+        Yields:
+            The point, its depth and the contact (`Depth`).
         """
         a, b, middle = edges.transpose(1, 0, 2)
         slopes = np.linalg.norm([4 * middle - 3 * a - b, a - 4 * middle + 3 * b], axis=-1)
@@ -207,6 +210,9 @@ class AdmissibilityCheck:
             state: the state.
             allowed: function of a `FaceContact` that returns the allowed penetration of its n contact points, shape
                 (n,) or a number, length.
+
+        Yields:
+            The point, its depth and the contact (`Depth`).
         """
         if self._problem.scene.kinematics.components < 3:
             return
@@ -220,14 +226,18 @@ class AdmissibilityCheck:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
 
     def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
-        """Yield for each tool the contact point with the largest ratio of penetration to deformed wall.
+        """Yield for each tool of a section the edge with the largest ratio of penetration to deformed wall.
 
-        It is yielded only if the ratio exceeds `Limits.penetration`.
+        It is yielded only if the ratio exceeds `AdmissibilityLimits.penetration`. The penetration of an edge is the
+        largest one of its three nodes. Only contacts whose contact points are nodes are examined.
 
         Args:
             edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
             lengths: their lengths, shape (m,).
             state: the state.
+
+        Yields:
+            The middle of the edge, its penetration and the contact (`Depth`).
         """
         weight, reference = self._problem.scene.kinematics.weight, self._outline.reference_edges
         for contact, face in zip(self._problem.contacts, self._faces):
@@ -266,13 +276,13 @@ def _allowed_penetration(contact: Any) -> np.ndarray:
 def _force_error(contact: Any, state: State, images: int) -> float:
     r"""Return the estimated relative error of the force F on a moving tool due to penetration; collective.
 
-    Penetration stores the energy E, so the tool has moved 2 E/F too far. With its travel t, the strain energy W of the
-    body and c = `AdmissibilityLimits.largest_energy_ratio`, the estimate is
+    Penetration stores the energy E. It adds about 2 E/F to the travel t of the tool at this force. With the strain
+    energy W of the body and c = `AdmissibilityLimits.largest_energy_ratio`, the estimate is
 
     .. math::
         \min\left(\frac{2 E}{F^2} \left|\frac{dF}{dt}\right|, \; c \, \frac{E}{W}\right)
 
-    E/W is returned if it is below a tenth of `Limits.warning_error`, or if F or the change of t is 0. For a fixed tool
+    E/W is returned if it is below 0.02 %, a tenth of `WARNED_ERROR`, or if F or the change of t is 0. For a fixed tool
     0 is returned.
 
     Args:

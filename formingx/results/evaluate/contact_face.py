@@ -24,8 +24,8 @@ class ContactTable(ColumnTable):
         points: deformed positions (r, z) of the points, shape (n, 2), length.
         gap: distance of each point from the tool, negative inside it, shape (n,), length.
         pressure: contact pressure per deformed area, positive in compression, shape (n,), stress.
-        friction: tangential traction of the body on the tool per deformed area, shape (n,), stress; positive in the
-            direction of the tool's profile.
+        friction: tangential traction of the body on the tool per deformed area, shape (n,), stress. Its positive
+            direction is the normal that points into the tool, rotated left by 90 degrees.
         comm: MPI communicator of the run.
     """
 
@@ -38,7 +38,10 @@ class ContactTable(ColumnTable):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the files: {name: values, shape (n,)}."""
+        """Columns of the table, {name: values, shape (n,)}.
+
+        Their names are reference_radius, reference_height, r, z, gap, contact_pressure and friction_stress.
+        """
         R, Z = self.reference_points.T
         return {"reference_radius": R, "reference_height": Z, "r": self.points[:, 0],
                 "z": self.points[:, 1], "gap": self.gap, "contact_pressure": self.pressure,

@@ -20,7 +20,7 @@ def dissipated_energy(segment: Segment, states: list[State], power: Quantity) ->
     Args:
         segment: the segment of the run with these states.
         states: successive states, at least two, with the column "dissipated_power".
-        power: the dissipated power of the whole part, bound to the problem of the segment.
+        power: output quantity that evaluates the dissipated power of the whole part in the problem of the segment.
 
     Returns:
         The energy of the whole part, stress length^3; in plane strain stress length^2. It is 0 if no time passes.

@@ -22,21 +22,21 @@ class Part(PartNumbers):
     In plane strain, volume, area, weight and capacity are per unit depth.
 
     Attributes:
-        volume: volume between the two faces, without the bulge of the rim, length^3.
+        volume: volume between the two faces, length^3. At the rim it ends on the straight line from face to face.
         area: area of the middle surface, length^2.
         draw_ratio: area over the reference area of the same material (areal draw ratio).
         mean_wall: volume over area, length.
         min_wall: minimum wall, length.
         min_wall_radius: reference radius R of the place of the minimum wall, length.
         min_wall_at: deformed position (r, z) of this place on the middle line, length.
-        min_wall_height: height of this place (`Wall.height`), length.
+        min_wall_height: axial distance of this place from the pole (`Wall.height`), length.
         min_wall_reference: reference position of this place on the bottom face: ("R", radius), and for a parison, on
             the inner face, ("Z", height).
         uniformity: minimum wall over mean wall, 1 for a uniform part.
         variation: coefficient of variation of the wall over the middle surface: standard deviation over mean value.
         weight: weight in grams, or None without a density. It uses the volume before thermal expansion, so it does not
             change with the temperature.
-        walls: {height: wall at this height}, length.
+        walls: {axial distance from the pole (`Wall.height`): wall there}, both length.
         scrap: fraction of the volume of the whole sheet that lies beyond the trim.
         capacity: volume that the part holds, length^3: it lies inside the inner face, up to planes across the ends of
             this face. For a pot, such a plane lies at its rim or trim.
@@ -82,7 +82,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
         axisymmetric: False in plane strain.
         density: density of the material for the weight, g/cm3; None: no weight.
         trim: radius r, or ("height", h), at which the part is cut off, length; None: not cut.
-        heights: heights (`Wall.height`) for `Part.walls`, length.
+        heights: axial distances from the pole (`Wall.height`) at which `Part.walls` has the wall, length.
         units: units of the script.
         planes: symmetry planes at which only a half or a quarter of the part is modelled.
 
@@ -118,9 +118,10 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
 
 
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
-    """Return the fraction, 0 to 1, of each strip between two nodes that belongs to the trimmed part, shape (n - 1,).
+    """Return the fraction, 0 to 1, of each strip of the wall that belongs to the trimmed part, shape (n - 1,).
 
-    The cut lies where the middle line passes the trim upwards for the last time on its way from the axis to the rim.
+    A strip lies between two successive nodes. On its way from the axis to the rim, the middle line may pass the trim
+    several times. The cut lies where it passes to a larger radius or height for the last time.
 
     Args:
         wall: the wall at n nodes, from the axis to the rim.
@@ -149,7 +150,7 @@ def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
 
     Args:
         wall: the wall at n nodes.
-        inside: fraction of each strip between two nodes that belongs to the part, shape (n - 1,).
+        inside: fraction of each strip, between two successive nodes, that belongs to the part, shape (n - 1,).
         axisymmetric: False in plane strain.
     """
     found = []
@@ -176,12 +177,14 @@ def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarr
 
 
 def _up_to(a: np.ndarray, b: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return the volumes between the axis r = 0 and n straight lines, shape (n,), length^3; positive if b is above a.
+    """Return the volumes inside the cones that n straight lines sweep about the axis, shape (n,), length^3.
+
+    A volume is positive if b lies above a.
 
     Args:
         a: first end (r, z) of each line, shape (n, 2), length.
-        b: second end of each line, shape (n, 2), length.
-        axisymmetric: True for the volumes of revolution; False for plane strain, per unit depth, length^2.
+        b: second end (r, z) of each line, shape (n, 2), length.
+        axisymmetric: False in plane strain, where the areas between each line and r = 0 are returned, length^2.
     """
     (r, z), (s, w) = a.T, b.T
     return np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)

@@ -69,8 +69,8 @@ class Patches:
             chunk: slice of the m cells.
 
         Returns:
-            One matrix per cell, shape (cells of the slice, 10, points of the largest patch). The columns of missing
-            points are 0.
+            One matrix per cell, shape (cells of the slice, 10, points of the largest patch). If a patch has fewer
+            points, its last columns are 0.
         """
         if chunk.start in self._operators:
             return self._operators[chunk.start]
@@ -96,7 +96,10 @@ class Patches:
         return self._basis(slice(None), points) @ coefficients
 
     def _basis(self, chunk: slice, points: np.ndarray) -> np.ndarray:
-        """Return the ten monomials of a cubic at points, in coordinates scaled by the patch, shape (cells, ..., 10).
+        """Return the ten monomials of a cubic at points, shape (cells, ..., 10).
+
+        Their coordinates R and Z have the mean quadrature point of the cell as origin. Each is divided by its largest
+        magnitude at the quadrature points of the patch.
 
         Args:
             chunk: slice of the m cells.

@@ -18,7 +18,7 @@ _LARGE_SHIFT = 0.1
 
 
 class Resticking(NamedTuple):
-    """Contact point that separated from its tool and stuck again furthest from its previous position.
+    """Contact point whose sticking position shifted most when it separated from its tool and stuck again.
 
     Attributes:
         tool: name of the `Contact` with the tool, or of its boundary if it has no name.
@@ -35,11 +35,11 @@ class Resticking(NamedTuple):
 
 
 def furthest(path: Any) -> Resticking | None:
-    """Return the contact point that stuck again furthest from its previous sticking position, of all tools; collective.
+    """Return the contact point with the largest shift of its sticking position on a tool; collective.
 
-    This distance over the tributary length of the point (`Resticking.shift`) is the change of the strain beside the
-    point. Whether a point separates may depend on small changes of the forces. So the shift also estimates the error of
-    the wall due to the step lengths.
+    A point shifts if it separates and sticks again at another position. The shift over the tributary length of the
+    point (`Resticking.shift`) is the change of the strain beside the point. Whether a point separates may depend on
+    small changes of the forces. So the shift also estimates the error of the wall due to the step lengths.
 
     Args:
         path: the computed `Path`. In a remeshed run only the states on the last mesh are examined.
@@ -64,10 +64,10 @@ def furthest(path: Any) -> Resticking | None:
 
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
-    """Return how far the n contact points that this rank owns stuck again from their previous sticking positions.
+    """Return the shifts of the sticking positions of the n contact points that this rank owns, shape (n,).
 
-    The result is the sum of the distances between successive sticking positions on the tool, over the tributary length
-    of the point, shape (n,), dimensionless.
+    A point shifts if it separates and sticks again at another position on the tool. The distances of all its shifts
+    are added, and divided by the tributary length of the point.
 
     Args:
         contact: the `FaceContact`.
@@ -84,10 +84,10 @@ def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
 
 
 def findings(item: Resticking | None) -> list[Finding]:
-    """Return a warning in a list if the wall depends on points that stick again elsewhere; else an empty list.
+    """Return a warning in a list if a sticking position shifted by 0.003 tributary lengths or more; else [].
 
     Args:
-        item: the contact point with the largest shift (`furthest`), or None.
+        item: the contact point with the largest shift from one sticking position to the next, or None.
     """
     if item is None or item.shift < WALL_ERROR:
         return []

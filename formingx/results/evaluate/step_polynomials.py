@@ -48,13 +48,13 @@ def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomia
 
 
 def integral(f: Polynomial, y: Polynomial) -> float:
-    r"""Return the integral of a force over a travel, exact if both are cubics; products of arrays are summed.
+    r"""Return the integral of a force over a travel, exact if both are cubics in s.
 
     .. math::
-        \int_0^1 f \, \frac{dy}{ds} \, ds
+        \int_0^1 \sum_i f_i \, \frac{dy_i}{ds} \, ds
 
     Args:
-        f: the force as a polynomial.
-        y: the travel as a polynomial.
+        f: the force as a polynomial; its values are numbers or arrays with entries f_i.
+        y: the travel as a polynomial, with values of the same shape.
     """
     return float(sum(w * np.sum(f.value(s) * y.slope(s)) for s, w in zip(*GAUSS)))

@@ -90,7 +90,9 @@ class StressField:
         return _unpack(positions, comm.allreduce(values, MPI.SUM))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
-        """Return the projected stresses of the cell's own layer at k points in each of the m cells that this rank owns.
+        """Return the projected stresses at k points in each of the m cells that this rank owns.
+
+        At an interface they are the stresses of the layer to which the cell belongs.
 
         Args:
             reference: the points, as coordinates in the reference triangle, shape (k, 2).
@@ -149,7 +151,7 @@ class StressField:
         return StressError(*(gathered(comm, v[selected]) for v in self._fitted.error(exact)))
 
     def error_in_cells(self) -> np.ndarray:
-        """Return the estimated root mean square error of the stress in the m owned cells, shape (m,); collective."""
+        """Return the estimated root mean square error of the Cauchy stress in the owned cells, (m,); collective."""
         return self._fitted.error().mean
 
     def peak(self, layer: str | None = None, radii: tuple[float, float] | None = None) -> StressPeak:
@@ -261,7 +263,7 @@ class Stresses:
             return self._projected()
 
     def _projected(self) -> np.ndarray:
-        """Return the result of `project` for the present unknowns, shape (nodes, layers, 9); collective."""
+        """Return the nodal values of F and S that `project` returns, for the present unknowns; collective."""
         n = self.space.dofmap.index_map.size_local + self.space.dofmap.index_map.num_ghosts
         nodes = np.zeros((n, len(self.cells), _COUNT))
         b, x = self._b, self._x
@@ -299,7 +301,7 @@ class Stresses:
         """Return for each of this rank's m cells the largest fitted principal Cauchy stress at its corners.
 
         Args:
-            fitted: result of `fit`.
+            fitted: computed and fitted stresses of these cells, from `fit`.
 
         Returns:
             The stresses, shape (m,), and the reference positions (R, Z) of the corners at which they occur, shape
@@ -332,8 +334,8 @@ class Stresses:
         """Return F, S and volumes at the q quadrature points of each of this rank's m cells of a layer in a state.
 
         Returns:
-            Reference positions (R, Z), shape (m, q, 2), length. Nonzero entries of F, then of S, shape
-            (m, q, entries). Reference volumes (quadrature weights), shape (m, q), length^3, in plane strain length^2.
+            Reference positions (R, Z), shape (m, q, 2), length. F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz and
+            S_hoop, (m, q, 9). Reference volumes (quadrature weights), (m, q), length^3, in plane strain length^2.
         """
         forms = self.problem.forms
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
@@ -359,13 +361,13 @@ class Stresses:
         return where[..., :-1], values, where[..., -1] * weights
 
     def _parts(self, names: list[str]) -> list[tuple[Any, dict]]:
-        """Return the second Piola-Kirchhoff stress S of layers as two addends: material, then volume term.
+        """Return the terms whose sum is the second Piola-Kirchhoff stress S: the material's, then the volume term.
 
         Args:
             names: names of the layers, which have one material.
 
         Returns:
-            For each part a pair (entries of S as UFL expressions, quadrature metadata of its integral).
+            For each term a pair (list of S_rr, S_rz, S_zz, S_hoop in UFL, quadrature metadata of its integral).
         """
         F = ufl.variable(self.problem.forms.F)
         parts = []
@@ -432,14 +434,14 @@ def _cauchy(values: np.ndarray) -> np.ndarray:
     """Return the Cauchy stress at q points of each of m cells, shape (m, q, 3, 3), stress.
 
     Args:
-        values: the nonzero entries of F (`BLOCK`), then of S (`_S`), in the order of `project`, shape (m, q, 9).
+        values: F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop at the points, shape (m, q, 9).
     """
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 
 
 def _unpack(points: np.ndarray, values: np.ndarray) -> Stress:
-    """Return the `Stress` at reference positions, shape (n, 2); values: entries of `project`, shape (n, 9)."""
+    """Return the `Stress` at points (n, 2) from values (n, 9): F_rr, _rz, _zr, _zz, _hoop, S_rr, _rz, _zz, _hoop."""
     F, S = np.zeros((2, len(points), 3, 3))
     for k, (i, j) in enumerate(BLOCK):
         F[:, i, j] = values[:, k]

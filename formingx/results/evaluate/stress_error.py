@@ -31,17 +31,25 @@ class StressError(NamedTuple):
 
     @property
     def mean(self) -> np.ndarray:
-        """Root mean square of |sigma* - sigma_h| in each cell, shape (n,), stress."""
+        """Root mean square over each cell of the error |sigma* - sigma_h|, shape (n,), stress.
+
+        sigma_h is the computed stress, sigma* the fitted or the exact one.
+        """
         return self.cells / np.sqrt(self.volume)
 
     @property
     def total(self) -> float:
-        """Root of the integral of |sigma* - sigma_h|^2 over all cells, stress * volume^(1/2)."""
+        """Root of the integral of the squared error |sigma* - sigma_h|^2 over all cells, stress * volume^(1/2).
+
+        sigma_h is the computed stress, sigma* the fitted or the exact one.
+        """
         return float(np.linalg.norm(self.cells))
 
     @property
     def relative(self) -> float:
         r"""Relative error of the stress over all cells, between 0 and 1; 0 without stress.
+
+        sigma_h is the computed stress, sigma* the fitted or the exact one.
 
         .. math::
             \eta = \left(\frac{\int |\sigma^* - \sigma_h|^2 \, dV}
@@ -90,7 +98,7 @@ class StressPeak(NamedTuple):
 
     @property
     def converged(self) -> bool:
-        """True if principal stress plus error exceeds the largest principal stress by at most 5 % in every cell."""
+        """True if the doubtful stress plus its error exceeds the largest principal stress `value` by at most 5 %."""
         return self.doubtful + self.doubtful_error - self.value <= LARGE_ERROR * abs(self.value)
 
     def __str__(self) -> str:
@@ -117,7 +125,8 @@ class Fitted(NamedTuple):
         volume: reference volumes of the quadrature points (quadrature weights), shape (m, q), length^3.
         raw: computed Cauchy stress sigma_h, shape (m, q, 3, 3), stress.
         smooth: fitted Cauchy stress sigma*, shape (m, q, 3, 3), stress.
-        cubics: coefficients of the cubics fitted to the k entries of F and S (`Patches`), shape (m, 10, k).
+        cubics: coefficients of the cubics (`Patches`) fitted to F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz and
+            S_hoop, shape (m, 10, 9).
     """
 
     points: np.ndarray
@@ -127,11 +136,11 @@ class Fitted(NamedTuple):
     cubics: np.ndarray
 
     def error(self, exact: Callable | None = None) -> StressError:
-        """Return the errors of the stress in this rank's cells (`StressField.error`).
+        """Return the errors of the computed stress in this rank's cells: its differences from a more accurate stress.
 
         Args:
             exact: function that returns the exact Cauchy stress, shape (n, 3, 3), at reference positions, shape (n, 2);
-                default the fitted stress.
+                default: the fitted stress takes its place.
 
         Raises:
             InputError: `exact` is not a function, or returns another shape.

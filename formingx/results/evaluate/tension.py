@@ -34,7 +34,7 @@ class Resultant(NamedTuple):
 
     @property
     def compressed(self) -> bool:
-        """True if the resultant is compressive by more than 0.001 times shear modulus times thickness."""
+        """True if the smallest resultant is below -0.001 times shear modulus times reference thickness."""
         return self.value < -NEGLIGIBLE
 
 
@@ -67,9 +67,9 @@ class Tension:
         self._found = _compat.compile_expression(values, forms.terms[0].places)
 
     def smallest(self, state: Any) -> Resultant:
-        """Return the smallest resultant in a state; collective.
+        """Return the smallest meridional or hoop resultant at the quadrature points in a state; collective.
 
-        In plane strain only the resultants in the section are examined, not those out of plane.
+        Compression is negative. In plane strain the resultants out of plane are not examined.
         """
         values = self._values(state)
         n = 2 if self._problem.scene.kinematics.axisymmetric else 1
@@ -80,8 +80,8 @@ class Tension:
         """Return the hoop resultants along a membrane in a state, from the axis to the rim; collective.
 
         Returns:
-            Reference positions (R, Z) of n points, ordered by R, shape (n, 2), length; hoop forces per reference length
-            of the section, positive in tension, shape (n,), stress length.
+            Reference positions (R, Z) of the n quadrature points, ordered by R, shape (n, 2), length; hoop forces per
+            reference length of the meridian, positive in tension, shape (n,), stress * length.
         """
         values = self._values(state)
         values = values[np.argsort(values[:, 2])]
@@ -91,7 +91,7 @@ class Tension:
         """Return data at the n quadrature points of all ranks in a state, shape (n, 5); collective.
 
         The columns are the meridional and the hoop resultant over shear modulus times thickness, R and Z (length), and
-        the hoop force per reference length (stress length).
+        the hoop force per reference length of the meridian (stress * length).
         """
         problem, domain = self._problem, self._problem.forms.domain
         with problem.state_context(state):

@@ -14,7 +14,7 @@ _CORNER_DISTANCE = 2.0
 """Distance from a clamped face, over the length of the face, within which its singular corners affect J."""
 
 _MAX_VOLUME_RATIO = 2.0
-"""Largest J, and largest 1/J, at a point away from the quadrature points; beyond it a report warns."""
+"""Largest J, and largest 1/J, at the quadrature points and between them; beyond it a report warns."""
 
 
 def findings(error: float, where: str, far_error: float | None = None) -> list[Finding]:
@@ -58,13 +58,14 @@ def away_from_clamps(path: Any) -> float | None:
 
 
 def _clamped(path: Any) -> tuple[np.ndarray, float]:
-    """Return the nodes of the clamped faces of a solid, and twice the length of the longest of these faces.
+    """Return the nodes of the clamped faces of a solid, and the distance within which their corners affect J.
 
     Args:
         path: the computed `Path`.
 
     Returns:
-        Reference positions, shape (n, 2), length, and the distance, length. Both are empty or 0 without such a face.
+        Reference positions, shape (n, 2), length; twice the length of the longest clamped face, length. Without a
+        clamped face n and the length are 0.
     """
     scene = path.problem.scene
     clamped = [support.on for support in scene.supports if isinstance(support, Clamped)] if scene.model.solid else []
@@ -74,9 +75,10 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
 
 
 def extreme_ratio(path: Any) -> list[Finding]:
-    """Return a finding in a list if J is not between 1/2 and 2 at all points of the last state; else an empty list.
+    """Return a finding in a list if J is not between 1/2 and 2 somewhere in the last state; else an empty list.
 
-    It is a warning for J <= 0 away from clamped faces, else a note. Collective.
+    J is examined at the quadrature points, at the points of the rule of the next higher degree, and at the middles of
+    the edges. The finding is a warning for J <= 0 away from clamped faces, else a note. Collective.
 
     Args:
         path: the computed `Path`.

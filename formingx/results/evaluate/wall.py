@@ -73,7 +73,11 @@ class Wall(ColumnTable):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the table: {name: values, shape (n,)}; with several layers also `wall_of_NAME` of each layer."""
+        """Columns of the table of n nodes, {name: values, shape (n,)}.
+
+        Their names are reference_radius, arc_length, r, z, height, wall, wall_ratio (wall over original thickness), and
+        with several layers `wall_of_NAME` for each layer.
+        """
         each = {f"wall_of_{name}": share * self.wall for name, share in self.layers.items()}
         return {"reference_radius": self.reference_radius, "arc_length": self.arc_length, "r": self.r, "z": self.z,
                 "height": self.height, "wall": self.wall, "wall_ratio": self.ratio, **(each if len(each) > 1 else {})}

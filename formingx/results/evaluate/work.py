@@ -37,7 +37,7 @@ _SPLIT_OFFSET = 0.15       # distance from the middle of a step at which it is s
 
 
 class _Reaction(NamedTuple):
-    """Reaction of a driven support or a tool in a state, on the body as modelled.
+    """Reaction of a driven support or a tool in a state, on the modelled body: the whole, a half or a quarter.
 
     Attributes:
         force: force of the support or tool on the body along its travel, stress length^2.
@@ -77,7 +77,7 @@ class EnergyBalance:
         Returns:
             {entry: energy added from the previous state to each state, shape (states,)}, stress length^3; in plane
             strain stress length^2. Entries of loads, supports and tools are their work on the body. "friction", "jumps"
-            and "bonds" are positive losses. `Path.work` lists the others. The first value is 0.
+            and "bonds" are positive losses. "heat" and "change" are energies added by changes of temperature and stage.
         """
         pairs = list(zip(self._states, self._states[1:]))
         found = [self._step_energies(a, b) for a, b in pairs]
@@ -97,7 +97,7 @@ class EnergyBalance:
             a: state at the start of the step.
             b: state at its end.
             estimate: {entry: energy added in the step}, computed without further states.
-            small: change of the sum of the energies up to which a half is not halved again, stress length^3.
+            small: largest change of the energy gained by the body due to a halving after which no other follows.
             times: largest number of halvings.
 
         Returns:
@@ -113,9 +113,9 @@ class EnergyBalance:
         return {name: found.get(name, 0.0) + second.get(name, 0.0) for name in {**found, **second}}
 
     def _middle(self, a: Any, b: Any) -> Any:
-        """Return a state near the middle of the step from state a to state b, or None if none is found; collective.
+        """Return a state near half the arc length from state a to state b, or None if none is found; collective.
 
-        The solution uses the history variables of a. They are then updated for the new state.
+        It is solved for with the history variables of a, and has its own, updated ones.
         """
         problem, curve, h = self._problem, self._curve, self._curve.distance(a, b)
         if not h:
@@ -140,17 +140,17 @@ class EnergyBalance:
 
     @staticmethod
     def _flows(a: Any, b: Any) -> bool:
-        """Return True if process time passes in the step from a to b, but not in proportion to the control."""
+        """Return True if process time passes from state a to state b at a rate that the control does not set."""
         return bool(b.time != a.time and not b.setting["rate"][-1])
 
     def _step_energies(self, a: Any, b: Any) -> dict[str, float]:
-        """Return {entry: energy added to the whole part in the step from state a to state b}."""
+        """Return {load, tool, loss or other entry: energy added to the whole part from state a to state b}."""
         images = self._problem.scene.symmetry_factor
         found = {name: images * value for name, value in self._body_energies(a, b).items()}
         return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
 
     def _body_energies(self, a: Any, b: Any) -> dict[str, float]:
-        """Return {entry: energy added to the body as modelled in the step from state a to state b}.
+        """Return {load, tool, loss or other entry: energy added to the modelled body from state a to state b}.
 
         The energy lost in a snap-through is not included.
         """
@@ -184,7 +184,7 @@ class EnergyBalance:
         return found
 
     def _load_work(self, a: Any, x: Polynomial, control: Polynomial) -> dict[str, float]:
-        """Return the work of each load, and of fading unbalanced forces, in a step, as {entry: work}.
+        """Return {load: work in a step}, and as "change" the work of fading forces that a new stage left unbalanced.
 
         Args:
             a: state at the start of the step.
@@ -207,13 +207,13 @@ class EnergyBalance:
         return found
 
     def _reactions(self, state: Any) -> dict[str, _Reaction]:
-        """Return {entry: reaction} of driven supports and tools in a state; it is computed once for each state."""
+        """Return {name of a driven support or tool: its reaction in a state}, computed once for each state."""
         if id(state) not in self._ends:
             self._ends[id(state)] = state, self._compute_reactions(state) if self._driven else {}
         return self._ends[id(state)][1]
 
     def _compute_reactions(self, state: Any) -> dict[str, _Reaction]:
-        """Compute {entry: reaction} of driven supports and tools in a state; collective."""
+        """Return {name of a driven support or tool: its reaction in a state}, computed anew; collective."""
         problem, found = self._problem, {}
         scene, forms = problem.scene, problem.forms
         scale = forms.stress * forms.volume / forms.length
@@ -261,19 +261,16 @@ class EnergyBalance:
         return dofs[dofs[:, 0] < problem.n_owned]
 
     def _at_ramp_edge(self, state: Any) -> bool:
-        """Return True if a contact point lies near the outer edge of the contact ramp, where contact forces begin.
-
-        Collective.
-        """
+        """Return True if a contact point is within 0.06 half-widths of the outer edge of the ramp; collective."""
         with self._problem.state_context(state) as problem:
             x, control = state.x[: problem.n_owned], state.control
             return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _RAMP_EDGE)
                               for c in problem.active_contacts]) > 0
 
     def _friction(self, a: Any, b: Any) -> float:
-        """Return the energy that friction dissipates on the body as modelled in the step from state a to state b.
+        """Return the energy that friction on the modelled body dissipates from state a to state b, stress length^3.
 
-        It is the sum over all contact points of area, mean tangential traction, and increment of the inelastic slip.
+        It is the sum over all contact points of area times mean tangential traction times increment of inelastic slip.
         """
         problem, lost, before = self._problem, 0.0, {}
         contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]
@@ -289,7 +286,7 @@ class EnergyBalance:
         return lost
 
     def _heat(self, a: Any, b: Any) -> float:
-        """Return the energy that the change of temperature stores in the body as modelled, from state a to state b.
+        """Return the energy that the change of temperature from state a to state b stores in the modelled body.
 
         It is the mean of two changes at constant displacements, in the configurations of a and b.
         """
@@ -301,12 +298,12 @@ class EnergyBalance:
         return sum(stored(state, warm) - stored(state, cold) for state in (a, b)) / 2
 
     def _energy_at(self, state: Any) -> float:
-        """Return the energy stored in the body as modelled and its elastic supports in a state; collective."""
+        """Return the energy stored in the modelled body and its elastic supports in a state; collective."""
         with self._problem.state_context(state) as problem:
             return self._energy * problem.assemble_scalar(self._stored)
 
     def _bonds(self, state: Any) -> float:
-        """Return the energy stored in the contacts with adhesive tools, on the body as modelled, in a state."""
+        """Return the energy stored in the contacts of the modelled body with adhesive tools in a state."""
         with self._problem.state_context(state) as p:
             return sum(resultants.energy(c, state.x[: p.n_owned], state.control)
                        for c in p.active_contacts if c.law.adhesive)
@@ -317,19 +314,19 @@ class EnergyBalance:
 
 
 def _gains(row: dict[str, float]) -> list[float]:
-    """Return the energies of a step as gains of the body: work on the body is positive, a loss negative.
+    """Return the energies of a step in the order of `row`, as gains of the body: losses change their sign.
 
     Args:
-        row: {entry: energy added in the step}.
+        row: {entry: work on the body or other energy added in the step, or loss, positive}.
     """
     return [-value if name in _LOSSES else value for name, value in row.items()]
 
 
 def _imbalance(row: dict[str, float], a: Any, b: Any) -> float:
-    """Return the unbalanced energy of the step from state a to b: gains minus changes of stored and dissipated energy.
+    """Return the unbalanced energy of a step: the gains minus the changes of stored and dissipated energy.
 
     Args:
-        row: {entry: energy added in the step}.
+        row: {entry: work on the body or other energy added in the step, or loss, positive}.
         a: state at the start of the step.
         b: state at its end.
     """
@@ -338,7 +335,7 @@ def _imbalance(row: dict[str, float], a: Any, b: Any) -> float:
 
 
 def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
-    """Return the friction traction at the n contact points of a `FaceContact` in a state, shape (n,), stress."""
+    """Return the tangential traction on the tool at n contact points, positive along its tangent, (n,), stress."""
     return contact.tractions(state.x[: problem.n_owned], state.control).tangential
 
 
@@ -380,7 +377,7 @@ def _entry_name(scene: Any, item: Any) -> str:
 
 
 def work(path: Any) -> dict[str, np.ndarray]:
-    """Return the energy balance of a run, and log a warning if it does not close (`Path.work`); collective.
+    """Return the energy balance of a run, and log a warning if more than 0.5 % is unbalanced; collective.
 
     The warning is added to the findings of the path.
 
@@ -388,7 +385,8 @@ def work(path: Any) -> dict[str, np.ndarray]:
         path: the computed `Path`.
 
     Returns:
-        {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
+        {load, tool, support, "strain_energy", kind of loss or "unbalanced": energy up to each state, shape (states,)},
+        stress length^3; in plane strain stress length^2.
 
     Raises:
         InputError: the material is of K-BKZ type, whose stored energy is no function of its state.
@@ -401,10 +399,10 @@ def work(path: Any) -> dict[str, np.ndarray]:
 
 
 def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
-    """Return a warning in a list if more than 0.5 % of the largest entry of an energy balance is unbalanced; else [].
+    """Return a warning in a list if "unbalanced" exceeds 0.5 % of the largest entry of an energy balance; else [].
 
     Args:
-        balanced: {entry: energy up to each state}, the result of `balance`.
+        balanced: {entry: energy up to each state, shape (states,)}, from `balance`.
     """
     size = max(float(np.abs(values).max()) for values in balanced.values())
     unbalanced = np.abs(balanced["unbalanced"])
@@ -418,13 +416,14 @@ def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
 
 
 def balance(path: Any) -> dict[str, np.ndarray]:
-    """Return the entries of the energy balance of a run without a warning (`Path.work`); collective.
+    """Return the energy balance of a run, without a check of its unbalanced energy; collective.
 
     Args:
         path: the computed `Path`.
 
     Returns:
-        {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
+        {load, tool, support, "strain_energy", kind of loss or "unbalanced": energy up to each state, shape (states,)},
+        stress length^3; in plane strain stress length^2.
 
     Raises:
         InputError: the material is of K-BKZ type, whose stored energy is no function of its state.
