@@ -37,7 +37,10 @@ def test_no_point_penetrates_a_tool_at_a_target(drawn, more):
                     progress=False) if more else drawn
     for target in targets:
         met = path.target_state(target).measures
-        assert abs(met["travel" if target.name == "travel" else "tool_force"]) == pytest.approx(target.value, rel=1e-8)
+        if target.name == "travel":
+            assert met["travel"] == pytest.approx(target.value, rel=1e-8)
+        else:                   # a penalty force has the round-off of positions: tolerances of 1e-12 leave 3e-8
+            assert abs(met["tool_force"]) == pytest.approx(target.value, rel=1e-7)
         assert met["penetration"] < 2e-3 * THICKNESS
     assert path["penetration"].max() > 0.05 * THICKNESS and serious(path) == []
 

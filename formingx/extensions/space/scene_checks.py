@@ -10,14 +10,13 @@ from ...errors import InputError, call_on_all_ranks, check_name, finite, positiv
 from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode
 from ...ranks import gathered
-from ...scene.contact_checks import OTHER_UNIT
 from .sheet import Sheet
 from .solid_tool import Swept
 
-_EXTENT_RATIO = 2 * OTHER_UNIT
+_EXTENT_RATIO = 9.0
 """Ratio of the largest extents of tool and sheet, either way, from which their units of length probably differ.
 
-The sheet may be a quarter of the whole, of half its width.
+The sheet may be a quarter of the whole.
 """
 
 

@@ -204,9 +204,9 @@ class SheetWall(ColumnTable):
         """
         size, found = positive("printed: size", size), []
         sides = np.ptp(self.reference_points[:, :COORDINATES], axis=0)
-        if np.prod(sides) > MAX_RECTANGLES * size * size:
-            raise InputError(f"printed: size = {size!r}: would make more than {MAX_RECTANGLES} squares on the sheet,"
-                             f" whose sides are {sides[0]:.4g} and {sides[1]:.4g}")
+        if np.prod(sides) > 2 * MAX_RECTANGLES * size * size:
+            raise InputError(f"printed: size = {size!r}: would make more than {2 * MAX_RECTANGLES} squares on the"
+                             f" sheet, whose sides are {sides[0]:.4g} and {sides[1]:.4g}")
         edges = edges_of(self.triangles)[1]
         for axis in (0, 1):
             a, b = self.reference_points[edges[:, 0]], self.reference_points[edges[:, 1]]
