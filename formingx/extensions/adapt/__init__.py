@@ -9,7 +9,8 @@ from .adapted import adapted, checked_columns
 
 
 class _Adaptation:
-    """Adaptation of the mesh of a run, as a `formingx.run_hooks.MeshAdaptation`."""
+    """Adaptation of a mesh to the states of a pilot run by `adapted`; implements `formingx.run_hooks.MeshAdaptation`.
+    """
 
     def check(self, mesh: Any) -> None:
         if mesh.domain.geometry.dim == 2:

@@ -22,22 +22,24 @@ _COLUMN_SAMPLES = 16
 
 
 def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | None = None) -> Mesh:
-    """Return a new mesh of the body of a run, with columns of elements as fine as its states need. Collective.
+    """Return a new mesh of the body of a run, with columns of elements as short as its states require; collective.
 
-    The length of a new column is the smallest that a state demands. It is at most 1.25 times its neighbour's. It is at
-    least an eighth of the column in the run, because lengths estimated on coarse columns are inaccurate. To refine
-    further, adapt a second time from a run on the new mesh. The elements through the sheet, layers and interfaces stay.
+    A column consists of the elements through the sheet between two successive cross-sections. Its new length is the
+    smallest that a state requires, and at most 1.25 times the length of its neighbour. It is at least an eighth of the
+    column's length in the run, because lengths estimated on coarse columns are inaccurate. To refine further, adapt a
+    second time from a run on the new mesh. The elements through the sheet, layers and interfaces stay.
 
     The mesh must come from `disc`, `sphere`, `parison` or `from_lines`. In a `sheet` in three dimensions triangles
-    become smaller, at most to a quarter, and never larger.
+    become smaller, at most to a quarter of their edge length, and never larger.
 
     Args:
         path: a run on a coarse mesh (a pilot run); it may be incomplete.
-        max_rotation: largest rotation of the sheet along a column, radians. On a fillet of a tool it is the length of
-            the column over the fillet radius. In three dimensions it is the rotation between triangles. None: ignored.
-        error: largest estimated relative error of the stress over the body (`StressError.relative`). The error of a
-            column is assumed to decrease with the square of its length. More columns do not help if too few elements
-            lie through the sheet. In three dimensions `error` is the relative change of the wall between triangles.
+        max_rotation: largest angle by which the sheet turns from one end of a column to the other, radians. On a fillet
+            of a tool, the length of a column is also at most `max_rotation` times the fillet radius. In three
+            dimensions: largest angle between neighbouring triangles. None: ignored.
+        error: largest estimated error of the stress over the stress, both as norms over the body. The error of a column
+            is assumed to decrease with the square of its length. More columns do not help if too few elements lie
+            through the sheet. In three dimensions: largest relative change of the wall between neighbouring triangles.
             None: ignored.
 
     Returns:
@@ -119,12 +121,12 @@ def checked_columns(mesh: Mesh) -> Columns:
 
 
 def _new_ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
-    """Return the coordinates along the sheet at which new columns end, in the unit of `columns.ends`, shape (k + 1,).
+    """Return the coordinates of the ends of the k new columns along the sheet, such as radii of a disc, shape (k + 1,).
 
-    A column consists of the elements through the sheet between two successive cross-sections; k is the new number.
+    A column consists of the elements through the sheet between two successive cross-sections.
 
     Args:
-        columns: the n present columns.
+        columns: the n present columns; their `ends` are coordinates of the same kind.
         factors: factors by which the columns should become longer, shape (n,); inf: as long as the longest column.
 
     Raises:

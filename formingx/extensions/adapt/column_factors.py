@@ -27,13 +27,14 @@ def column_factors(path: Any, max_rotation: float | None, error: float | None) -
     """Return the factors by which the n columns of a mesh should become longer (below 1: shorter).
 
     A column consists of the elements through the sheet between two successive cross-sections. A factor is the length
-    that the column should have over its present length. The state of the run that demands the smallest one counts.
+    that the column should have over its present length. The smallest factor over the states of the run is returned.
 
     Args:
         path: the run.
         max_rotation: largest angle, radians, by which the sheet turns from one end of a column to the other. The
-            length of a column on a fillet of a tool is at most `max_rotation` times the fillet radius. None: ignored.
-        error: largest estimated relative error of the stress over the body; None: ignored.
+            length of a column on a fillet of a tool is also at most `max_rotation` times the fillet radius. None:
+            ignored.
+        error: largest estimated error of the stress over the stress, both as norms over the body; None: ignored.
 
     Returns:
         Factors, shape (n,); inf where no state demands a length.
@@ -69,14 +70,14 @@ def _nearest_column(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
 
 
 def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) -> np.ndarray:
-    """Return the factors by which the n columns of elements should become longer for a largest angle, shape (n,).
+    """Return the required over the present length of the n columns of elements for a limit of rotation, shape (n,).
 
-    It is the angle by which the sheet turns from one end of a column to the other. On a fillet of a tool it is instead
-    the length of the column over the fillet radius.
+    The limit applies to the angle by which the sheet turns from one end of a column to the other. On a fillet of a tool
+    it also applies to the length of the column over the fillet radius. The smallest ratio over the states is returned.
 
     Args:
         path: the run.
-        max_rotation: largest angle, radians.
+        max_rotation: limit, radians.
         middles: reference positions of nodes halfway along the columns, shape (rows of nodes, n, 2), length.
     """
     found = np.full(middles.shape[1], np.inf)
@@ -113,14 +114,15 @@ def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) ->
 
 
 def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Return the angle by which the sheet turns along each of n columns of elements, radians, shape (n,).
+    """Return the angle by which the sheet turns along each of n columns of elements, radians, at most 1, shape (n,).
 
-    Half of a kink between two columns counts in each.
+    Where the tangent jumps between two columns, each of the two angles includes half of the jump.
 
     Args:
         edges: deformed edges of the outline: first end, second end, midpoint, shape (m, 3, 2), length.
-        sides: for each of the two faces, the row numbers in `edges` of its n edges, in the order of the columns, shape
-            (n,). A mask, shape (n,), is True for edges whose first end lies at the end of their column.
+        sides: (numbers, mask) for each of the two faces, in the order of the columns, shape (n,) each. The numbers are
+            the rows of the face's edges in `edges`. The mask is True for an edge whose first end lies at the end of its
+            column.
     """
     tangent = np.zeros(edges.shape[-1])                      # at both ends of each column, averaged over both faces
     for numbers, reversed_edges in sides:
@@ -135,17 +137,17 @@ def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) ->
 
 
 def _factors_by_stress_error(path: Any, error: float, middles: np.ndarray) -> np.ndarray:
-    r"""Return the factors by which the n columns should become longer for a given error of the stress, shape (n,).
+    r"""Return the required over the present length of the n columns of elements for a given stress error, shape (n,).
 
     .. math:: h \propto C^{-2/(2p + 1)}, \qquad \int (C h^p)^2 \, ds = \varepsilon^2 \|\sigma\|^2
 
     C h^p is the error of the stress sigma in a column of elements of length h. The order is p = 2, and the run gives
-    the constant C of each column. s is the length along the sheet, and epsilon the relative error. The smallest factor
-    over the examined states is returned; a factor is h over the present length.
+    the constant C of each column. s is the length along the sheet. The smallest ratio of h to the present length over
+    the examined states is returned.
 
     Args:
         path: the run.
-        error: largest estimated relative error epsilon of the stress over the body.
+        error: largest estimated error of the stress over the stress, epsilon, both as norms over the body.
         middles: reference positions of nodes halfway along the columns, shape (rows of nodes, n, 2), length.
     """
     n = middles.shape[1]

@@ -63,12 +63,15 @@ def _neighbours(triangles: np.ndarray) -> np.ndarray:
 
 
 def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return sizes at nodes, reduced so that they grow by at most `GROWTH` per length of an edge, shape (n,).
+    """Return sizes at nodes, reduced so that at the ends of an edge they differ by at most 0.25 of its length.
 
     Args:
         points: positions of the nodes, shape (n, 3), length.
         triangles: node numbers, shape (m, 3).
-        size: edge lengths of triangles at the nodes, shape (n,), length.
+        size: required edge lengths of triangles at the nodes, shape (n,), length; changed in place.
+
+    Returns:
+        The reduced `size`.
     """
     a, b = edges_of(triangles)[1].T
     growth = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)

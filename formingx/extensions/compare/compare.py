@@ -52,12 +52,13 @@ class Comparison:
         line: finely interpolated points of our curve, shape (m, c).
         pairs: indices of the k compared points of `theirs`, shape (k,), and their partners on our curve, shape (k, c).
         differences: {column: `Difference`}.
-        limit_points: limit points of (ours, theirs), each a list of {column: value}. A run has located the points of a
-            `Path`. Others lie on the parabola through the three points at which the control turns. The control is
-            pressure or travel, else the first column.
-        resolution: resolution of (our, their) curve: the largest distance of every second point from the curve through
-            the other points. Each column is divided by its range before. A difference below a tenth of the resolution
-            may come from interpolation. A `Path` also knows its tangents, so its curve is more accurate.
+        limit_points: limit points of (ours, theirs), each a list of {column: value}. For a `Path` they are states that
+            the run located. For a table each is the vertex of the parabola through three points, at whose middle point
+            the control turns. The control is pressure or travel, else the first column.
+        resolution: resolutions of (our curve, their curve), with each column divided by its range. Every second point
+            is left out. The resolution is the largest distance of a point left out from the curve through the others. A
+            difference below a tenth of the resolution may come from interpolation. A `Path` also knows its tangents, so
+            its curve is more accurate.
         along: independent column at whose values the others are compared; "" for pairs by arc length.
     """
 
@@ -290,7 +291,10 @@ def _is_monotonic(values: np.ndarray) -> bool:
 
 
 def _largest_slope(points: np.ndarray, k: int) -> float:
-    """Return the largest slope of any column over column k between successive points of a curve, shape (n, c)."""
+    """Return the largest slope |d column| / |d column k| between successive points of a curve, over all columns.
+
+    points: points of the curve, shape (n, c). k: number of the independent column.
+    """
     steps = np.abs(np.diff(points, axis=0))
     return float((steps.max(1) / steps[:, k]).max())
 
@@ -300,9 +304,9 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
 
     Args:
         values: differences at the k compared points of their curve, shape (k,).
-        size: range of the column in our curve.
-        partners: points of our curve that these are compared with, in the c columns, each divided by its range, shape
-            (k, c). The arc length along them weights the mean.
+        size: range of the column in our curve, its largest minus its smallest value.
+        partners: points of our curve with which the k points are compared, each of the c columns divided by its range,
+            shape (k, c). The root mean square is weighted with the arc length along these points.
     """
     s = arc_length(partners)
     weights = np.ones(len(s))
@@ -317,8 +321,8 @@ def _limit_points(table: csv_files.CsvTable, points: np.ndarray, names: list[str
                   ) -> list[dict[str, float]]:
     """Return the limit points of a curve, each as {column: value}.
 
-    These are the states that a run marks as limit points. For other tables they are the turning points of parabolas
-    through the three points at which the control turns.
+    For a run they are its states of the kind "limit point". For other tables each is the vertex of the parabola through
+    three points, at whose middle point the control turns.
 
     Args:
         table: the table of the curve.

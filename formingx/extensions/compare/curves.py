@@ -136,14 +136,15 @@ def pair_at_equal_values(points: np.ndarray, curve: np.ndarray, k: int) -> tuple
 
 
 def resolution_of(points: np.ndarray, k: int | None) -> float:
-    """Return the largest distance of every second point from the curve through the other points.
+    """Return the resolution of a curve: the largest error if every second point is interpolated from the others.
 
     Args:
         points: points of the curve, shape (n, c), each column divided by its range.
-        k: column at whose equal values distances are measured; None for distances across the curve.
+        k: number of the independent column: the error is the difference in another column at an equal value of this
+            one. None: the error is the distance from the interpolated curve.
 
     Returns:
-        Largest distance; infinite for fewer than five points.
+        Resolution, dimensionless; infinite for fewer than five points.
     """
     if len(points) < 5:
         return float("inf")

@@ -138,14 +138,15 @@ class MeasuredWall:
                               interpolated(profile.wall_thickness), distance, path.problem.comm)
 
     def _locate(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the places of the measured points on the middle line of a computed part, which is a polyline.
+        """Return the positions of the measured points on the middle line of a computed part, which is a polyline.
 
         Args:
             profile: outline of the computed part, a `Profile`.
 
         Returns:
-            Positions in units of the point number of the polyline (2.5: between points 2 and 3), shape (m,); distances
-            of the measured points from the line, or beyond its end, shape (m,), length.
+            Positions in units of the point number of the polyline (2.5: halfway between points 2 and 3), shape (m,).
+            Distances of points given by (r, z) from the line, shape (m,), length. For points given by arc lengths it is
+            the arc length by which they lie beyond an end of the line, 0 between the ends.
 
         Raises:
             InputError: a measured `length` or `reference_length` lies outside the computed part by more than a tenth of
@@ -180,7 +181,8 @@ class WallComparison:
         reference_length: arc lengths of the points along the undeformed middle line, shape (m,), length.
         measured: measured thicknesses, shape (m,), length.
         computed: computed thicknesses, shape (m,), length.
-        distance: distances of the measured points from the computed middle line, or beyond its end, shape (m,), length.
+        distance: distances of points measured by (r, z) from the computed middle line, shape (m,), length. For points
+            measured by arc lengths: the arc length by which they lie beyond an end of the line, 0 between the ends.
         comm: MPI communicator of the run.
     """
 
@@ -243,8 +245,9 @@ class WallComparison:
 
         The columns length and reference_length are arc lengths of the points from the axis, along the deformed and the
         undeformed middle line. The columns measured and computed are thicknesses. The column deviation_percent is
-        computed minus measured, in percent of the measured thickness. The column distance is the distance of the
-        measured point from the computed middle line, or its arc length beyond the end of the line.
+        computed minus measured, in percent of the measured thickness. The column distance is the distance of a point
+        measured by (r, z) from the computed middle line. For a point measured by its arc length, it is the arc length
+        by which the point lies beyond an end of the line.
 
         Args:
             file: path of the CSV file.

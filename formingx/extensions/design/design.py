@@ -31,8 +31,8 @@ class Design:
     Args:
         build: function that takes the parameters by name, and returns (scene, target) or (scene, stages) for `trace` or
             `Process.run`. It is also called with slightly changed parameters, for derivatives: then only the positions
-            of the nodes of its mesh may differ, not their number. In a contact without `nodes_per_step` one gap closes
-            per step, so that the gap closures have exact derivatives.
+            of the nodes of its mesh may differ, not their number. In the runs, one gap closes per step of a contact
+            without `nodes_per_step`, so that the gap closures have exact derivatives.
         parameters: {name: start value, (start value, lower bound, upper bound), or `spline(...)`}. `build` receives a
             spline as a function of a length from 0 to 1.
         step: control of the step length of each run, as in `trace`.
@@ -85,10 +85,10 @@ class Design:
         return self._run(self.parameters.vector(values or {}))
 
     def _make(self, vector: np.ndarray) -> tuple[Any, Any]:
-        """Return (scene, target or stages) from the user's function, checked.
+        """Return (scene, target) or (scene, list of stages), whichever the user's function returns, checked.
 
         Args:
-            vector: values of the n numbers of the parameters, shape (n,).
+            vector: values of the parameters, those of a profile at its knots, shape (n,).
         """
         made = self._build(**self.parameters.values(vector))
         if not isinstance(made, tuple) or len(made) != 2 or not isinstance(made[0], Scene):
@@ -102,7 +102,7 @@ class Design:
         return scene, end
 
     def _run(self, vector: np.ndarray) -> DesignRun:
-        """Compute the run for the n numbers of the parameters, shape (n,)."""
+        """Compute the run for values of the parameters, those of a profile at its knots, shape (n,)."""
         scene, end = self._make(vector)
         scene = copy.copy(scene)                             # the scene of the script does not change
         scene.one_node_per_step = True
@@ -219,8 +219,8 @@ class Design:
         """Search for the smallest reference volume whose wall thickness is nowhere below a minimum.
 
         Successive linear programs minimise the linearised volume within a trust region, which shrinks if a run is worse
-        (Palacios-Gomez, Lasdon and Engquist 1982). The wall at every node is a linear constraint. So the minimum wall,
-        which has kinks, needs no derivative.
+        (Palacios-Gomez, Lasdon and Engquist 1982). The wall at every node is a separate linear constraint. So no
+        derivative is needed where the thinnest node changes and the minimum wall is not differentiable.
 
         Args:
             min_wall: minimum wall thickness, length.

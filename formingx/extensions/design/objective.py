@@ -19,13 +19,13 @@ class SearchSettings:
     Attributes:
         volume_weight: weight of the relative deviation of a prescribed volume; deviations of the wall have weight 1.
         volume_margin: relative reduction of the first run's volume as a target, so that round-off does not exceed it.
-        limiting_share: a bound or the prescribed volume is named as the reason of a deviation of the wall if it makes
-            most of it. Removed from the search, it would leave a deviation below this share of the present one.
+        limiting_share: a report names the bounds or the prescribed volume as the reason of a deviation of the wall if
+            the deviation without them would be below this share of the present one.
         damping: Levenberg damping over the largest singular value of the sensitivities; for a measured wall, which
-            contains scatter, it is `MEASURED_ACCURACY`.
+            contains scatter, it is `formingx.values.tolerances.MEASURED_ACCURACY`, 0.01.
         min_improvement: smallest relative decrease of the cost. The search ends after two runs that each decrease it by
             less, or before a step for which the derivatives predict less.
-        shortest_step: smallest part of a step that is tried, after halving a step that brought no improvement.
+        shortest_step: smallest fraction of a step that is tried; a step that brings no improvement is halved.
     """
 
     volume_weight: float = 1e2
@@ -119,12 +119,15 @@ class WallObjective:
         return self._with_volume(run, residual, slopes)
 
     def _with_volume(self, run: DesignRun, residual: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Append the weighted residual of a prescribed volume and its derivatives.
+        """Return residuals and their derivatives, extended by a row for the volume if the volume is prescribed.
 
         Args:
             run: a run of the search.
             residual: residuals of the wall, shape (m,).
             slopes: their derivatives by the n parameters, shape (m, n).
+
+        Returns:
+            Residuals, shape (m,) or (m + 1,), and derivatives, shape (m, n) or (m + 1, n).
         """
         if self.volume is not None:
             volume_slope = run.derivative("volume")[1][0] / self.volume
@@ -173,7 +176,7 @@ class WallObjective:
     def _limits(self, run: DesignRun) -> str:
         """Return a sentence that names the bounds or the prescribed volume that prevent the wanted wall.
 
-        The derivatives of the run predict the deviation without them.
+        The derivatives of the run predict how much of the deviation would remain without the bounds, or the volume.
         """
         try:
             residual, jacobian = self.residual(run)
@@ -219,8 +222,8 @@ class MeasuredWallObjective(WallObjective):
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
         """Return the residuals of a run and their derivatives by the n parameters.
 
-        The residuals are the relative deviations of the wall from the measured wall at the m points. With a prescribed
-        volume its relative deviation follows, multiplied by sqrt(m) `SearchSettings.volume_weight`.
+        The residuals are the relative deviations of the wall from the measured wall at the m points. If the volume is
+        prescribed, the last residual is its relative deviation times 100 sqrt(m) (`SearchSettings.volume_weight`).
 
         Args:
             run: a run of the search.
@@ -252,17 +255,17 @@ class MeasuredWallObjective(WallObjective):
 
 def _deviation(residual: np.ndarray, jacobian: np.ndarray, m: int, low: np.ndarray,
                high: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the smallest deviation that a linearised step within bounds can reach, and the step.
+    """Return the step within bounds that minimises the linearised residuals, and the deviation of the wall after it.
 
     Args:
-        residual: residuals before the step, shape (k,).
+        residual: residuals before the step, first those of the wall, shape (k,).
         jacobian: their derivatives by the n scaled parameters, shape (k, n).
-        m: number of residuals that belong to the wall.
+        m: number of residuals of the wall.
         low: lower bounds of the step, shape (n,).
         high: upper bounds of the step, shape (n,).
 
     Returns:
-        Root mean square of the first m residuals after the step; the step, shape (n,).
+        Root mean square of the residuals of the wall after the step; the step, shape (n,).
     """
     from scipy.optimize import lsq_linear
     step = lsq_linear(jacobian, -residual, bounds=(low, high)).x

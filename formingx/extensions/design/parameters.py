@@ -73,7 +73,7 @@ class Spline:
 def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Spline:
     """Return a design parameter that is a profile of thickness, temperature or a material constant.
 
-    The function that builds the scene receives the profile as a function of a length from 0 to 1, see `Knots`.
+    The function that builds the scene receives the profile as a function (`Knots`) of a length from 0 to 1.
 
     Args:
         knots: number k of equidistant knots, 2 or more; with `smooth` 4 or more.
@@ -191,7 +191,7 @@ class Parameters:
 
 
 def _number(name: str, given: Any) -> Spline:
-    """Return a parameter that is a single number.
+    """Return the start value and the bounds of a parameter that is a single number, as a `Spline` with one knot.
 
     Args:
         name: name of the parameter.
@@ -211,8 +211,8 @@ def _check_bounds(caller: str, start: np.ndarray, low: Any, high: Any) -> None:
     Args:
         caller: name of the caller, for messages.
         start: start values, shape (k,).
-        low: lower bound.
-        high: upper bound.
+        low: lower bound of all k values, a number.
+        high: upper bound of all k values, a number.
     """
     try:
         low, high = float(low), float(high)

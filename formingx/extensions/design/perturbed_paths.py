@@ -33,10 +33,10 @@ from .perturbed_runs import PerturbedRun, solve_perturbed
 
 
 def trace_perturbed(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> None:
-    """Solve for all perturbed runs at the last state of the base run; collective.
+    """Solve for all perturbed runs at the last state of the base run, and store their states in them; collective.
 
-    A perturbed run is the base run with one parameter slightly changed. Derivatives by this parameter are difference
-    quotients between the runs.
+    A perturbed run is the base run with one parameter slightly changed. The caller computes derivatives by this
+    parameter as difference quotients between the runs.
 
     Args:
         path: the `Path` of the base run.
@@ -58,7 +58,8 @@ class _PerturbedPaths:
         perturbed: the perturbed runs; their states are updated in place.
 
     Raises:
-        Failure: a remeshed body, contact in three dimensions, or a parameter that changes controls or tables of stages.
+        Failure: a remeshed body, contact in three dimensions, or a parameter that changes the control of a stage or the
+            number of knots of its amplitudes.
     """
 
     def __init__(self, path: Path, end: Any, perturbed: Sequence[PerturbedRun]):
@@ -115,7 +116,10 @@ class _PerturbedPaths:
             raise Failure("it did not reach its target", [])
 
     def _start(self, state: State) -> None:
-        """Set the perturbed runs to the first state of the base run: undeformed, or in equilibrium with its loads."""
+        """Set the perturbed runs to the first state of their path: undeformed, or in equilibrium with initial loads.
+
+        state: first state of the base run.
+        """
         for run in self.runs:
             run.x, run.control = state.x.copy(), state.control
         self._closing: list[np.ndarray] = []
@@ -126,10 +130,13 @@ class _PerturbedPaths:
                 solve_perturbed(self.curve, state, self.runs, constraint, [constraint] * len(self.runs))
 
     def _begin_stage(self, setting: StepData) -> None:
-        """Begin a stage, or a piece of a stage between two rows of its tables, in each perturbed run.
+        """Begin a stage, or a piece of a stage, in each perturbed run.
+
+        Piece 0 of a stage is the change from the stage before. A stage in time then has a piece for each interval
+        between successive knots of its amplitudes.
 
         Args:
-            setting: step data of the stage in the base run.
+            setting: step data of the stage or piece in the base run.
         """
         for run in self.runs:
             problem, p = run.problem, run.plans[setting.stage]
@@ -336,13 +343,14 @@ def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: b
 
 
 def _fixed_properties(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
-    """Return the properties of a stage, given as its `Plan`, that no parameter may change.
+    """Return the properties of a stage that no parameter may change.
 
-    Items are the loads, supports and contacts of the scene, counted from 0.
+    Args:
+        p: the stage, with indices of its loads, supports and contacts in `Scene.items`.
 
     Returns:
-        Numbers of the controlled items. For each table of an amplitude, (number of its item, number of its rows).
-        Numbers of the inactive items.
+        Indices of the controlled items. For each amplitude in time, (index of its item, how many knots it has). Indices
+        of the inactive items.
     """
     return p.numbers, [(i, len(table)) for i, table in p.tables], p.inactive
 

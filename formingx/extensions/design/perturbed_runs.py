@@ -32,12 +32,13 @@ from ...values.tolerances import ROUND_OFF
 class PerturbedTolerances:
     """Convergence criterion of a perturbed run.
 
-    The criterion is the Newton correction of (x, control) over the distance of the perturbed state from the base state.
+    A run has converged if its Newton correction of (x, control), over the distance of the perturbed state from the base
+    state, is at most the tolerance. Without contact the tolerance is `formingx.values.tolerances.ROUND_OFF`, 1e-9.
 
     Attributes:
-        tolerance_in_contact: tolerance with contact; without, it is `ROUND_OFF`.
-        last_tolerance: tolerance after the last iteration; above it the perturbed run fails.
-        round_off: correction over the norm of the base state up to which it counts as round-off.
+        tolerance_in_contact: tolerance with contact.
+        last_tolerance: tolerance in the last allowed iteration; above it the perturbed run fails.
+        round_off: a correction also suffices if it is at most this multiple of the norm of the base state.
     """
 
     tolerance_in_contact: float = 1e-5
@@ -49,9 +50,10 @@ _TOLERANCES = PerturbedTolerances()
 
 
 class PerturbedRunFailure(Failure):
-    """Failure to find a perturbed state near the base state.
+    """Failure to find a state of a perturbed run near the state of the base run.
 
-    The change of the parameter then moves contact points by more than the small distance over which contact begins.
+    The change of the parameter is too large: it moves contact points by more than the distance over which the contact
+    pressure begins.
     """
 
 
@@ -67,15 +69,15 @@ class PerturbedRun:
     Attributes:
         name: name of the parameter.
         end: target or stages with the changed parameter.
-        path: the state as a path, made when an output quantity first needs it; None before.
+        path: path with the state alone, made when an output quantity first needs it; None before.
         problem: the `Problem` of the perturbed run.
         F: residual, a PETSc vector for temporary results.
         gradient: gradient of a constraint, a PETSc vector for temporary results.
         x: locally owned unknowns of the state, shape (n,).
         control: load parameter (control) of the state, dimensionless.
         history_variables: history variables of the state.
-        plans: `Plan` of each stage: the stage with the items of its scene given by their numbers.
-        piece_end: time at which the present piece of a stage ends.
+        plans: `Plan` of each stage, in which loads, supports and contacts are indices into `Scene.items`.
+        piece_end: process time at which the present piece of a stage in time ends, at a knot of its amplitudes.
 
     Raises:
         InputError: the elements of the mesh, or the number of items or unknowns, differ from the base run.
@@ -126,7 +128,8 @@ class PerturbedRun:
     def balance(self, base_residual: np.ndarray) -> None:
         """Compute the contact forces of the perturbed run by equilibrium with the internal forces of the body.
 
-        The changes of the gaps are below round-off, so the contact law gives no accurate force.
+        The gaps differ from those of the base run by less than round-off, so the contact law gives no accurate force.
+        The correction of the force of each contact is stored in its `unbalanced`.
 
         Args:
             base_residual: residual of the base run, locally owned entries, shape (n,).
@@ -170,8 +173,8 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
 
     .. math:: K \, dx + F_\lambda \, d\lambda = -F', \qquad c_x \, dx + c_\lambda \, d\lambda = -c'
 
-    with residual F' and constraint c' of the perturbed run, its unknowns x and its control. The problem of the base run
-    must have been restored to the state, with the history variables before it.
+    with residual F' and constraint c' of the perturbed run, its unknowns x and its control lambda. Subscripts are
+    derivatives. The problem of the base run must be in the state, with the history variables of the state before it.
 
     Args:
         curve: solver of the base run, a `Curve`.

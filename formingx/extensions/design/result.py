@@ -190,8 +190,8 @@ class DesignResult:
         Args:
             file: path of the HTML file.
             title: heading of the page.
-            deviations: {parameter: standard deviation}, a `Fit` with its covariance, or a list of such. They add the
-                standard deviation to the wall, and a table with those of wall, volume, pressures and forces.
+            deviations: {parameter: standard deviation}, a `Fit` with its covariance, or a list of such. The report
+                then shows the standard deviations of the wall, volume, pressures and forces.
             units: a `formingx.Units`, for the labels; default without units.
 
         Returns:

@@ -40,7 +40,8 @@ class Effects:
         measure: name of the quantity.
         names: names of the n parameters.
         sizes: ranges of the parameters, or their start values without a range, shape (n,).
-        coordinates: of the wall, reference lengths of its m nodes, shape (m,), length; of other quantities 0 to m - 1.
+        coordinates: abscissa of the values, shape (m,). For the wall it is the reference length of the node: the
+            distance from the axis along the undeformed middle line, length. Otherwise it counts from 0 to m - 1.
         value: values of the quantity, shape (m,).
         jacobian: derivatives of the values by the parameters, shape (m, n).
     """
@@ -63,9 +64,10 @@ class Effects:
     __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw a heat map of the derivatives of the output quantity by all parameters.
+        """Draw a heat map of the derivatives, with a row for each parameter, over `coordinates`.
 
-        It shows the change of the quantity, to first order, if a parameter changes by a tenth of its range.
+        The colour is the change of the output quantity, to first order, if the parameter changes by a tenth of its
+        range.
 
         Args:
             axes: matplotlib axes; default a new figure.
@@ -90,7 +92,7 @@ class Effects:
 
 
 class DesignRun:
-    """A run of a design for given parameters, which computes its derivatives by them; see `Design.run`.
+    """A run of a design for given parameters, which computes its derivatives by them (result of `Design.run`).
 
     Args:
         make: function of a vector of parameters, shape (n,), that returns (scene, target or stages).
@@ -138,9 +140,13 @@ class DesignRun:
 
     @cached_property
     def _perturbed_runs(self) -> list[tuple[list[PerturbedRun], float]]:
-        """For each parameter, the perturbed runs at the last state, and the difference of the parameter between them.
+        """For each parameter, its perturbed runs at their last state, and the parameter's difference for a quotient.
 
-        With contact there is one perturbed run for each parameter, and the difference is between it and this run.
+        Without contact there are two runs, at the parameter's value plus and minus a step; the difference is two steps.
+        With contact there is one; the difference is its value of the parameter minus the value in this run.
+
+        Raises:
+            InputError: the run has no derivative.
         """
         contact, reason = bool(self.path.problem.contacts), ""
         for size in [_CONTACT_CHANGE / 10**k for k in range(3)] if contact else [DIFFERENCE_STEP]:
@@ -161,7 +167,7 @@ class DesignRun:
         raise InputError(f"Design: this run has no derivative: {reason}")
 
     def _perturbed_run(self, k: int, step: float) -> PerturbedRun:
-        """Return a perturbed run, still to be solved: parameter number k has its value plus `step`, in its unit."""
+        """Return a new perturbed run without a state, whose parameter number k is larger by `step` than in this run."""
         moved, name = self.vector.copy(), self.parameters.names[k]
         moved[k] += step
         try:
@@ -194,7 +200,8 @@ class DesignRun:
         """Return the derivatives of an output quantity by all parameters as a table that can be printed and drawn.
 
         Args:
-            measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
+            measure: the quantity: "wall" (thickness at the nodes of the bottom face), "volume" (reference volume), a
+                column of the path, or a function of a path that uses only its last state.
 
         Returns:
             Table of the m values and their derivatives. The rows of a wall are ordered by `coordinates`: the reference
@@ -215,7 +222,8 @@ class DesignRun:
             deviations: {parameter: standard deviation}; the knots of a profile are independent, with equal deviations.
                 Or a `Fit` whose constants have the names of parameters, or the `Confidence` of a fit to a measured
                 wall, with its covariance. Or a list of such.
-            measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
+            measure: the quantity: "wall" (thickness at the nodes of the bottom face), "volume" (reference volume), a
+                column of the path, or a function of a path that uses only its last state.
 
         Returns:
             Standard deviation of each of the m values, shape (m,).
@@ -230,8 +238,11 @@ class DesignRun:
         """Return an output quantity with its confidence band for uncertain parameters, to first order.
 
         Args:
-            deviations: {parameter: standard deviation}, a `Fit`, a `Confidence`, or a list of such, see `spread`.
-            measure: the quantity: "wall", "volume", a column of the path or a function of it, see `derivative`.
+            deviations: {parameter: standard deviation}; the knots of a profile are independent, with equal deviations.
+                Or a `Fit` whose constants have the names of parameters, or the `Confidence` of a fit to a measured
+                wall, with its covariance. Or a list of such.
+            measure: the quantity: "wall" (thickness at the nodes of the bottom face), "volume" (reference volume), a
+                column of the path, or a function of a path that uses only its last state.
             confidence: confidence level of the band, between 0 and 1, for a normal distribution.
 
         Returns:
@@ -249,8 +260,8 @@ class DesignRun:
         Args:
             file: path of the HTML file.
             title: heading of the page.
-            deviations: {parameter: standard deviation}, a `Fit` with its covariance, or a list of such. They add the
-                standard deviation to the wall, and a table with those of wall, volume, pressures and forces.
+            deviations: {parameter: standard deviation}, a `Fit` with its covariance, or a list of such. The report
+                then shows the standard deviations of the wall, volume, pressures and forces.
             units: a `formingx.Units`, for the labels; default without units.
 
         Returns:
@@ -267,7 +278,10 @@ class DesignRun:
         """Return the values of an output quantity in the last state of this run, shape (m,).
 
         Args:
-            measure: the quantity, see `derivative`.
+            measure: "wall", "volume", a column of the path, or a function of a path that uses only its last state.
+
+        Raises:
+            InputError: the quantity depends on earlier states, or is none of these.
         """
         if isinstance(measure, str):
             if measure in ("wall", "volume"):
@@ -292,7 +306,7 @@ class DesignRun:
 
         Args:
             perturbed: the perturbed run, at its last state.
-            measure: the quantity, see `derivative`.
+            measure: "wall", "volume", a column of the path, or a function of a path that uses only its last state.
         """
         if measure == "volume":
             return _volume(perturbed.problem)

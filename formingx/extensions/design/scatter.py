@@ -18,7 +18,8 @@ class Band:
 
     Attributes:
         measure: name of the quantity.
-        coordinates: of the wall, reference lengths of its m nodes, shape (m,), length; of other quantities 0 to m - 1.
+        coordinates: abscissa of the values, shape (m,). For the wall it is the reference length of the node: the
+            distance from the axis along the undeformed middle line, length. Otherwise it counts from 0 to m - 1.
         value: values of the quantity in the run, shape (m,).
         deviation: standard deviations of the values, shape (m,).
         confidence: confidence level of the band between `low` and `high`, for a normal distribution.
