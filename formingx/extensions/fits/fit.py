@@ -115,8 +115,8 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
 
     Args:
         material: a class (`MooneyRivlin`, `Ogden`, ...), or a material whose constants are the first guess. A
-            `Hyperelastic` must be given as a material, and so must a `KBKZ` with a damping. Of this the damping is
-            fitted, and the spectrum does not change (see `fit_spectrum`).
+            `Hyperelastic` must be given as a material, and so must a `KBKZ` with a damping. Only the damping of a
+            `KBKZ` is fitted; `fit_spectrum` fits its spectrum.
         data: {test: (stretches, nominal stresses)}, arrays of shape (n,), for any of "uniaxial", "pure_shear" (planar)
             and "equibiaxial". For "biaxial": (stretches 1, stretches 2, nominal stresses 1, nominal stresses 2); nan
             for a stress that was not measured. The constants get the unit of the stress, force over reference area.
@@ -196,12 +196,12 @@ def _fit_timed(fitted: Callable, material: Any, data: Any, terms: int | None, re
 
 def _result(material: Any, constants: dict[str, float], parts: dict[str, slice], misfit: np.ndarray,
             measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any) -> Fit:
-    """Return the `Fit` with the misfits of a fitted material, which gets a copy with the range of its tests.
+    """Return the `Fit` with a copy of a fitted material that stores the range of its tests, and with its misfits.
 
     Args:
         material: material with the fitted constants.
         constants: {constant: value} of the fitted constants.
-        parts: {test: slice of its points}.
+        parts: {test: slice of its points in `misfit` and `measured`}.
         misfit: computed minus measured stress at all m points, shape (m,).
         measured: measured stress at all points, shape (m,).
         found: uncertainty of the constants.

@@ -165,17 +165,18 @@ class _TimedData:
 
     Args:
         tests: the checked tests.
-        law: class of the material.
+        law: class of the relaxing material.
         relative: True for misfits over the measured stress, False for misfits in stress.
         weights: weight of each test.
 
     Attributes:
         tests: the checked tests.
         stress: measured nominal stresses, shape (n,).
-        scale: largest absolute measured stress.
+        scale: largest absolute measured stress, the unit of bounds and first guesses of moduli.
         sizes: stress by which each misfit is divided, shape (n,).
         log_tau: logarithms of the relaxation times at which the stress of a branch is computed, shape (k,).
-        branch: spline over the logarithm of the relaxation time, which gives the stresses of a branch of unit modulus.
+        branch: spline that returns the stresses of branches of unit modulus, shape (n, j), for the logarithms of their
+            relaxation times, shape (j,).
         largest_I1: largest first invariant of C at the points.
 
     Raises:
@@ -206,7 +207,7 @@ class _TimedData:
     def equilibrium_stress(self, material: Material | None, constants: Any = None) -> np.ndarray:
         """Return the nominal stresses of the equilibrium material at all points, shape (n,).
 
-        They are not finite beyond the limit of the material.
+        They are infinite or nan at stretches beyond the limit of the material (Gent, Arruda-Boyce).
 
         Args:
             material: equilibrium of a relaxing material, or None for no stress.
@@ -283,7 +284,9 @@ def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tup
 def _guesses(data: _TimedData, material: GeneralisedMaxwell, n: int) -> list[GeneralisedMaxwell]:
     """Return materials with n branches from which a fit starts.
 
-    Two are made from the spectrum that fits best. The given material is the third if it has n branches.
+    A spectrum of many relaxation times is fitted first. In the first guess each of the n times stands for an equal
+    share of its moduli. In the second the logarithms of the times are equally spaced over its range. The given material
+    is the third if it has n branches.
 
     Args:
         data: measured stresses of the tests, and stresses of single branches at the same points.
@@ -309,15 +312,15 @@ def _guesses(data: _TimedData, material: GeneralisedMaxwell, n: int) -> list[Gen
 
 
 def _scaled(material: Material | None, factor: float, I1: float) -> Material | None:
-    """Return a first guess of the equilibrium material with the shear modulus of a given one times a factor.
+    """Return a first guess of an equilibrium material, whose shear modulus is a multiple of a given material's.
 
     Args:
-        material: the material, or None.
-        factor: factor of the shear modulus.
-        I1: largest first invariant of C in the tests; it lies within the limit of the result.
+        material: the given material, or None.
+        factor: shear modulus of the guess over the shear modulus of the given material.
+        I1: largest first invariant of C in the tests. The stress of the guess is finite there.
 
     Returns:
-        First guess of the same class, or the material itself if its class has none; None for None.
+        First guess of the same class, or the material itself if its class has no first guesses; None for None.
     """
     if material is None:
         return None

@@ -18,9 +18,9 @@ _UNITS = {"stress": tuple(STRESSES), "time": ("s", "ms", "min", "h")}
 
 
 def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
-    """Read the tests of a CSV file, see `fit`.
+    """Read the tests of a CSV file with the columns test, stretch, stress (nominal) and, for tests in time, time.
 
-    A test ends where its name changes or the time decreases.
+    If the first line names the columns, their order is free. A test ends where its name changes or the time decreases.
 
     Args:
         file: path of the CSV file.
@@ -30,8 +30,8 @@ def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
         time, shape (2, n) or (3, n). An empty stress is nan.
 
     Raises:
-        InputError: a file that cannot be read or has no rows, a header without these columns or with another unit, or a
-            malformed row.
+        InputError: a file that cannot be read or has no rows, a first line without a required column or with an unknown
+            unit, or a malformed row.
     """
     caller = f"fit: data: {file}"
     try:
@@ -59,7 +59,7 @@ def _columns(caller: str, head: list[str]) -> list[int]:
         head: names of the columns, the first line of the file.
 
     Raises:
-        InputError: a missing or doubled column, or an unknown unit.
+        InputError: a missing or duplicate column, or an unknown unit.
     """
     found: dict[str, int] = {}
     for k, cell in enumerate(head):
@@ -113,10 +113,12 @@ def _numbers(where: str, row: list[str], columns: list[int]) -> list[float]:
 
 
 def _test_numbers(points: list[tuple[str, list[float]]]) -> list[int]:
-    """Return the number of the test of each row; a test ends where its name changes or the time decreases.
+    """Return for each row of a file the number of the test to which it belongs, counted from 0.
+
+    A test ends where its name changes or the time decreases.
 
     Args:
-        points: (name of the test, [stretch, stress and, if there is one, time]) of each row.
+        points: for each row (name of the test, [stretch, stress] or [stretch, stress, time]).
     """
     found, n = [], 0
     for (mode, row), (before, last) in zip(points, [points[0], *points]):

@@ -65,7 +65,9 @@ class Points:
         self.largest_I1 = float((l1**2 + l2**2 + (l1 * l2) ** -2).max())
 
     def stress(self, response: Any, constants: Any) -> np.ndarray:
-        """Return the nominal stresses of a material in the order of `measured`; not finite beyond its limit.
+        """Return the nominal stresses of a material in the order of `measured`.
+
+        They are infinite or nan at stretches beyond the limit of the material (Gent, Arruda-Boyce).
 
         Args:
             response: stress response of the material, `Material.response`.
@@ -126,12 +128,12 @@ def hint_if_strains(values: np.ndarray) -> str:
 
 
 def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return stretches and nominal stresses of a test in both directions, shape (2, n) each, checked.
+    """Return stretches and nominal stresses of a test in both in-plane directions, shape (2, n) each, checked.
 
-    A stress that was not measured is nan.
+    A stress that was not measured is nan, such as the second stress of a test other than "biaxial".
 
     Args:
-        mode: name of the test.
+        mode: "uniaxial", "pure_shear", "equibiaxial" or "biaxial".
         columns: (stretches, stresses), or for "biaxial" (stretches 1, stretches 2, stresses 1, stresses 2).
 
     Raises:

@@ -27,8 +27,9 @@ class MeasuredRange:
     """Range of the tests to which the constants of a material were fitted.
 
     A deformation is described by its largest and its middle principal logarithmic strain. It counts as tested if these
-    lie in the convex hull of the tested strains and zero strain. A distance of up to 10 % of their norm, or 0.02, from
-    the hull is allowed. A deformation between two tested modes therefore counts as tested.
+    lie in the convex hull of the tested strains and zero strain, or near the hull. Near is a distance of at most 0.02,
+    or 10 % of the norm of the two strains if that is more. A deformation between two tested modes therefore counts as
+    tested.
 
     Attributes:
         ranges: {test: (lowest, highest stretch)}; the test is "uniaxial", "pure_shear", "equibiaxial" or "biaxial".
@@ -90,7 +91,7 @@ class MeasuredRange:
         return np.where(np.all(side >= 0, axis=1) & (len(corners) > 2), 0.0, found)
 
     def outside(self, strains: np.ndarray) -> np.ndarray:
-        """Return the mask of the deformations that the tests do not cover.
+        """Return the mask of the deformations that do not count as tested.
 
         Args:
             strains: largest and middle logarithmic strain of m deformations, shape (m, 2).

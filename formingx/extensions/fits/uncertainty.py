@@ -72,15 +72,16 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 
 
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
-    """Return the derivative of the scaled stresses by one constant, by a difference quotient, shape (n,).
+    """Return the derivative of the stresses, each divided by its size, by one constant, shape (n,).
 
-    It is 0 if no step up to doubling the constant changes a scaled stress by more than 1e-6.
+    It is a difference quotient. The step grows until a stress changes by more than 1e-6 of its size. If it would exceed
+    the constant itself, the derivative is 0.
 
     Args:
         stress: function of the constants, shape (p,), that returns stresses, shape (n,).
         first: stresses for the fitted values, shape (n,).
         values: fitted values of the constants, shape (p,).
-        i: number of the constant.
+        i: number of the constant, from 0.
         sizes: stress by which each misfit is divided, shape (n,).
     """
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])

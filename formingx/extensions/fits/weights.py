@@ -38,7 +38,7 @@ def divisors(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np
 
 
 def named_weights(weights: Any, names: list[str]) -> list[float]:
-    """Return the weights of named tests, checked.
+    """Return the weights of tests that are given by name, checked.
 
     Args:
         weights: {test: weight}, or None; tests without a weight have weight 1.
@@ -61,10 +61,10 @@ def named_weights(weights: Any, names: list[str]) -> list[float]:
 
 
 def numbered_weights(weights: Any, count: int) -> list[float]:
-    """Return the weights of numbered tests, checked.
+    """Return the weights of a list of tests in time, checked.
 
     Args:
-        weights: list with the weight of each test; None for weights of 1.
+        weights: list with the weight of each test; None: all weights are 1.
         count: number of tests.
 
     Returns:

@@ -95,10 +95,10 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
     """Return the pairs of triangles at a common edge with solid between them, as row numbers of `triangles`, (2,) each.
 
-    The vertices of each triangle run counter-clockwise seen from outside the solid. On a way around the edge, solid
-    therefore begins at a triangle that runs along the edge from edge[1] to edge[0]. It ends at the next triangle that
-    runs from edge[0] to edge[1]. The way is counter-clockwise, seen from edge[1] towards edge[0]. At equal angles an
-    end comes before a beginning.
+    The triangles are sorted by their angle about the edge, counter-clockwise seen from edge[1] towards edge[0]. Seen
+    from outside the solid, the vertices of a triangle are counter-clockwise. Solid therefore lies after a triangle with
+    the edge in the order (edge[1], edge[0]), up to the next one with the opposite order. Of two triangles at equal
+    angles, the one that ends the solid comes first.
 
     Args:
         points: vertices, shape (n, 3), length.

@@ -52,12 +52,12 @@ class LaggedFriction(LaggedStick):
     """Contact law of points that slide on a tool in three dimensions, with lagged friction or without friction.
 
     Friction is lagged: its limit mu N_0 is constant during a step. N_0 is the pressure at the last accepted state,
-    extrapolated. The module states the equations. The law uses the history variables (`ContactHistory`) of n points
-    in this way:
+    extrapolated along the path. The history variables (`ContactHistory`) of the n points at this state are:
 
-    * `position`: positions at the last accepted state, shape (n, 3), length.
-    * `slip`: elastic slip at this state, shape (n, 3), length.
-    * `distance`: of a point in contact, its depth in the tool at this state; times the penalty k it is the pressure.
+    * `position`: positions, shape (n, 3), length.
+    * `slip`: elastic slips as vectors, shape (n, 3), length.
+    * `distance`: depth in the tool of a point in contact, 0 or more, which is the pressure over the penalty k; signed
+      distance of an open point, below -theta; shape (n,), length.
     * `closure`: positions that store N_0: their depth in the tool is N_0/k, shape (n, 3), length.
 
     Args:
@@ -168,13 +168,13 @@ class LaggedFriction(LaggedStick):
         Args:
             x: positions relative to the tool, shape (n, 3), length.
             old: history variables of the last accepted state.
-            sense: direction of sliding in the previous iteration, shape (n,): angle in the tangent plane, 0 for a point
-                that did not slide. None in the first iteration.
+            sense: direction of sliding in the previous iteration, shape (n,): angle in the tangent plane from the first
+                to the second vector of `_basis`, radians; 0 for a point that did not slide. None: first iteration.
             expected: positions predicted by the previous iteration, with distances to first order; None: linearise at
                 x.
 
         Returns:
-            Tractions per reference area, stress, with their stiffness and functions for the new history variables.
+            Tractions per reference area, stress, with their stiffness and the new history variables.
         """
         assert old is not None
         positions, zero = x if expected is None else expected.position, np.zeros(len(x))
@@ -250,14 +250,20 @@ class LaggedFriction(LaggedStick):
         return Motion(x, d, n, np.zeros(len(x)), np.zeros_like(x))
 
     def _distances(self, x: np.ndarray) -> Distances:
-        """Return distances, normals and Hessians at positions x, shape (n, 3), length; the last result is stored."""
+        """Return distances, normals and Hessians at positions x, shape (n, 3), length.
+
+        The last result is stored, and returned again for the same positions.
+        """
         if self._last is None or not np.array_equal(self._last[0], x):
             self._last = x.copy(), self.tool.distances(x)
         return self._last[1]
 
 
 class _Tractions(Tractions):
-    """Contact tractions whose `sense` is the direction of sliding: an angle in the tangent plane, 0 without sliding."""
+    """Contact tractions whose `sense` is the direction of sliding as an angle in the tangent plane, radians.
+
+    It is measured from the first vector of `_basis` towards the second, and is 0 for a point that does not slide.
+    """
 
     @property
     def status(self) -> np.ndarray:

@@ -100,7 +100,9 @@ class LaggedStick(ContactLaw):
         return np.zeros(len(x), dtype=bool) if old is None else self.in_contact(old)
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distances of points from the tool; the last three results are stored.
+        """Return the signed distances of points from the tool.
+
+        The last three results are stored, and returned again for the same positions.
 
         Args:
             x: positions relative to the tool, shape (n, 3), or m positions of each point, shape (m, n, 3), length.
@@ -131,14 +133,14 @@ class LaggedStick(ContactLaw):
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the tractions k (x - x_0) of sticking points with sticking positions x_0; 0 for open points.
+        """Compute the tractions k (x - x_0) of sticking points with the penalty k; 0 for open points.
 
-        The law computes no normals: the normal traction (`Tractions.normal`) is 1 for a sticking point, 0 for an open
-        one.
+        The sticking position x_0 is where the point crossed the tool. The law computes no normals: `Tractions.normal`
+        is 1 for a sticking point and 0 for an open one, not a stress.
 
         Args:
             x: positions relative to the tool, shape (n, 3), length.
-            old: history variables of the last accepted state.
+            old: history variables of the last accepted state; not None.
             sense: not used.
             expected: not used.
 

@@ -137,7 +137,10 @@ class SheetFilling(ColumnTable):
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
-        """Columns of the written file, with a row for each state: {name: values, shape (n,)}."""
+        """Columns of the table, with a row for each state: {name: values, shape (n,)}.
+
+        They are the first column of the run, such as "pressure", then "touching" and "gap", the attributes.
+        """
         return {self.control[0]: self.control[1], "touching": self.touching, "gap": self.gap}
 
 
@@ -149,7 +152,8 @@ def filling(path: Any, contact: Any) -> SheetFilling:
         contact: contact of the sheet with the tool, a `FaceContact`.
 
     Returns:
-        Share of the area in contact, and largest gap, in each state.
+        In each state the share of the sheet's area that touches the tool, and the largest distance of the sheet from
+        the tool.
     """
     rows, comm = [], path.problem.comm
     for state in path.states:

@@ -56,7 +56,7 @@ class SheetReader:
         return parts.part(self.wall(state), density, trim, heights, units, self._path.scene.symmetry)
 
     def filling(self, contact: FaceContact) -> SheetFilling:
-        """Return the filling of a tool in all states: share of the area in contact, and largest gap; collective.
+        """Return the filling of a tool by the sheet in all states; collective.
 
         Args:
             contact: contact of the sheet with the tool.

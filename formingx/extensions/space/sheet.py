@@ -163,7 +163,7 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
 
     Raises:
         InputError: an outline that intersects itself, a size that is not positive, or more than 500,000 triangles. Also
-            a reflected boundary that is not straight, or whose line the sheet meets elsewhere.
+            a reflected boundary that is not straight, or if the sheet crosses or touches its straight line elsewhere.
 
     >>> quarter = fx.mesh.rectangle(300, 200, corner=20, part="quarter")
     >>> print(fx.mesh.sheet(quarter, size=40))
@@ -269,10 +269,12 @@ class _Size:
             return 1e22
 
     def area_and_size(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the areas of m pieces that together cover an outline, and the edge length in each, shape (m,) each.
+        """Return the area and the edge length of triangles of m equal pieces of a polygon, shape (m,) each.
+
+        A constant edge length needs one piece.
 
         Args:
-            x: corners of the outline, shape (n, 2), length.
+            x: corners of the polygon, shape (n, 2), length.
         """
         y = np.roll(x, -1, axis=0)
         area = abs(np.sum(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])) / 2
@@ -347,7 +349,7 @@ def _reflected(grid: Grid, name: str) -> Grid:
         name: name of the boundary, which the result does not have.
 
     Raises:
-        InputError: the boundary is not straight, or the sheet meets its line elsewhere too.
+        InputError: the boundary is not straight, or the sheet crosses or touches its straight line elsewhere.
     """
     X, (sheet,) = grid.points, grid.layers.values()
     line = np.unique(grid.boundaries[name])

@@ -104,7 +104,7 @@ class SolidTool:
         raise NotImplementedError
 
     def _surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return vertices, shape (n, 3), and triangles, shape (m, 3), of the unmoved tool."""
+        """Return vertices, shape (n, 3), length, and vertex numbers of triangles, shape (m, 3), of the unmoved tool."""
         raise NotImplementedError
 
 
@@ -137,7 +137,7 @@ class Swept(SolidTool):
             x: positions, shape (n, 3), length.
 
         Returns:
-            Distances, normals and Hessians at the n points; normals point into the tool.
+            Distances (positive inside the tool), normals (into the tool) and Hessians at the n points.
 
         >>> found = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=-10.0)).distances([[0.0, 0.0, -8.0]])
         >>> found.distance.tolist(), found.normal.tolist()
@@ -162,11 +162,14 @@ class Swept(SolidTool):
         return self.profile.signed_distance(np.column_stack([self._profile_coordinate(x)[0], x[:, 2]]))
 
     def _profile_coordinate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the profile coordinate r of points x, shape (n, 3), length, with its derivatives.
+        """Return the coordinate r of points in the plane (r, z) of the profile, with its derivatives.
+
+        Args:
+            x: positions, shape (n, 3), length.
 
         Returns:
             r, shape (n,), length; gradient of r with respect to x, shape (n, 3); curvature of the curve of constant r
-            through each point, shape (n,), 1/length.
+            in the plane of x and y through each point, shape (n,), 1/length.
         """
         way = np.zeros((len(x), 3))
         if self.kind == "extruded":
@@ -189,7 +192,7 @@ class Swept(SolidTool):
         return float(np.ptp(self.profile.bounds, axis=0).max()) if self.sized else 1.0
 
     def _surface(self):
-        """Return vertices, shape (n, 3), and triangles, shape (m, 3), of the unmoved tool."""
+        """Return vertices, shape (n, 3), length, and vertex numbers of triangles, shape (m, 3), of the unmoved tool."""
         return self._swept(self.profile.outline())
 
     def to_stl(self, file: Any, wall: float) -> None:
@@ -227,7 +230,7 @@ class Swept(SolidTool):
         return rings.reshape(-1, 3), np.stack([np.stack([a, b, c], -1), np.stack([a, c, d], -1)], -2).reshape(-1, 3)
 
     def _ring(self, r: float) -> np.ndarray:
-        """Return points (x, y) of the curve that the profile point at coordinate r sweeps, shape (n, 2), length."""
+        """Return points (x, y) of the curve that a point (r, z) of the profile sweeps, shape (n, 2), length."""
         turn = np.linspace(0, np.pi / 2, _CORNER_PIECES + 1)
         if self.kind == "extruded":
             ends = np.array([-1.0, 1.0]) * np.ptp(self.profile.bounds, axis=0).max() / 2

@@ -117,7 +117,8 @@ class Surface(Formulation):
             deformed: True for deformed areas, False for reference areas.
 
         Returns:
-            Linear form (UFL); its entry at the first component of a node is the tributary area, length^2.
+            Linear form (UFL) of the displacement; of the three entries of a node, the first is the tributary area,
+            length^2, and the others are 0.
         """
         ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
         return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
@@ -137,7 +138,11 @@ class Surface(Formulation):
         return sum(self.thicknesses.values())
 
     def _deformation_gradient(self) -> Any:
-        """Return the deformation gradient of the incompressible membrane up to a rotation (UFL, shape (3, 3))."""
+        """Return the deformation gradient of the incompressible membrane, rotated to upper triangular form.
+
+        Its rows belong to axes along the deformed x direction, across it in the surface, and along the normal (UFL,
+        shape (3, 3)).
+        """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         f1, f2 = (ufl.as_vector([F[i, k] for i in range(3)]) for k in (0, 1))
         n = ufl.cross(f1, f2)
@@ -179,11 +184,12 @@ class _AlwaysAdmissible:
 def relaxed(F: Any) -> Any:
     """Return the deformation gradient whose energy is the relaxed energy of tension-field theory.
 
-    Where the membrane is taut, it is F. Where only the smaller principal stretch is compressive, it is simple tension
-    with the larger one, in principal axes. Where both are compressive, it is the identity.
+    Where the membrane is taut, the result is F. Where it wrinkles, the result is simple tension with the larger
+    principal stretch, in principal axes. Where both principal stretches are compressive, the result is the identity.
 
     Args:
-        F: deformation gradient of a membrane up to a rotation (UFL, shape (3, 3)), see `Surface`.
+        F: deformation gradient of an incompressible membrane, upper triangular, with the third axis along the normal
+            (UFL, shape (3, 3)).
 
     Returns:
         Deformation gradient (UFL, shape (3, 3)).

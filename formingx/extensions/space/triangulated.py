@@ -27,7 +27,8 @@ class Triangulated(SolidTool):
     Attributes:
         name: name of the file from which the surface was read.
         triangles: number of triangles.
-        volume: total volume of the bodies, length^3; a volume that two bodies share counts twice.
+        volume: volume inside the surface, length^3. If it consists of several bodies that overlap, the common volume
+            counts twice.
         middle: mean of the vertices, shape (3,), length.
     """
 
@@ -57,21 +58,22 @@ class Triangulated(SolidTool):
         return found
 
     def _surface(self):
-        """Return vertices, shape (n, 3), and triangles, shape (m, 3), of the unmoved tool."""
+        """Return vertices, shape (n, 3), length, and vertex numbers of triangles, shape (m, 3), of the unmoved tool."""
         return self._points, self._triangles
 
     def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
         """Compute the undercut area and the smallest draft of a mould for a direction of demoulding.
 
-        Only the triangles of the cavity count: inside the convex hull of the tool, and not inside another of its
-        bodies.
+        Only triangles inside the convex hull of the tool count, the surface of its cavity. Triangles inside another
+        body of the tool do not count.
 
         Args:
             along: direction in which the part leaves the mould, shape (3,), of any length.
 
         Returns:
-            {"undercut_area": area of the triangles whose normal points against the direction, length^2, "min_draft":
-            smallest angle between another triangle and the direction, degrees; 90 if there is none}.
+            {"undercut_area": area of the triangles whose outward normal points against the direction, length^2,
+            "min_draft": smallest angle between the direction and the plane of a triangle that is no undercut, degrees;
+            90 if there is none}.
         """
         from scipy.spatial import ConvexHull
         way = direction("undercuts: along", along)

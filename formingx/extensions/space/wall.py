@@ -85,7 +85,10 @@ class SheetWall(ColumnTable):
 
     @cached_property
     def at_nodes(self) -> np.ndarray:
-        """Wall thickness at the nodes, shape (n,), length: mean of the adjacent triangles, see `to_nodes`."""
+        """Wall thickness at the nodes, shape (n,), length.
+
+        It is the mean of the adjacent triangles, weighted with their reference areas.
+        """
         return self.to_nodes(self.wall)
 
     @property
@@ -94,8 +97,8 @@ class SheetWall(ColumnTable):
 
         X, Y and x, y, z are the reference and deformed positions of the centroid, length, and `area` is the deformed
         area. `wall` is the deformed thickness, length; `wall_ratio` is `wall` over the reference thickness. `stretch_1`
-        and `stretch_2` are the larger and the smaller principal stretch. `wrinkled` is 1 in compression, else 0. A
-        sheet of several layers also has `wall_of_` with the name of each, the deformed thickness of this layer, length.
+        and `stretch_2` are the larger and the smaller principal stretch. `wrinkled` is 1 in compression, else 0. For a
+        sheet of several layers, `wall_of_NAME` is the deformed thickness of the layer NAME, length.
         """
         X, x = self.reference_points[self.triangles].mean(1), self.middle
         each = {f"wall_of_{name}": h * self.ratio for name, h in self.layers.items()}
