@@ -9,6 +9,7 @@ from conftest import ROOT
 
 import formingx as fx
 from formingx.mesh.fillets import fillets_in_sheet, flats_in_sheet
+from formingx.results.evaluate import creases
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import accuracy_in_moulds as moulds  # noqa: E402
@@ -135,6 +136,21 @@ def test_edges_sharper_than_the_wall_and_thick_sheets_are_reported():
     assert not findings(1.2, 1.0)
     (severity, text), = findings(1.2, 5.0)
     assert severity == "note" and "thicker than a tenth" in text
+
+
+def test_face_that_creases_between_sticking_points_is_reported(standard_cup):
+    """A thick parison, whose outer face is shortened where it bends from the shoulder into the neck of a flask."""
+    mould = fx.tools.bottle(radius=18.0, height=45.0, neck=8.5, shoulder=14.0, neck_height=10.0, base=-12.0,
+                            fillet=4.0, shoulder_fillet=6.0)
+    scene = fx.Scene(mesh=fx.mesh.parison(inner_radius=6.0, thickness=1.4, length=70.0, elements=(30, 1)),
+                     materials=fx.Gent(mu=0.4, Jm=40.0), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("neck")], contacts=[fx.Contact("outer", mould, "stick")])
+    path = fx.trace(scene, until=fx.pressure(0.4), progress=False)
+    crease = creases.deepest(path)
+    assert 0.5 < crease.stretch < 0.75 and crease.face == "outer"
+    assert mould.nearest(np.array([crease.point])).distance[0] == pytest.approx(0, abs=0.1)
+    assert [found.severity for found in path.findings() if "creases" in found.text] == ["warning"]
+    assert creases.findings(creases.deepest(standard_cup)) == []
 
 
 def columns(mesh, **scene):

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..findings import Finding, register
-from ..results.evaluate import edges, resticking, snaps, tension, volume
+from ..results.evaluate import creases, edges, resticking, snaps, tension, volume
 from ..values.tolerances import NOTICEABLE
 
 
@@ -29,12 +29,13 @@ def volumes(path: Any) -> Iterator[Finding]:
 def contact(path: Any) -> Iterator[Finding]:
     """Report inaccurate contact in a `Path`; collective.
 
-    The causes are penetration that changes tool forces, coarse elements at edges of tools, and sticking points that
-    separate and stick again elsewhere.
+    The causes are penetration that changes tool forces, coarse elements at edges of tools, sticking points that
+    separate and stick again elsewhere, and faces that crease between sticking points.
     """
     yield from path.admissibility.findings(path.last)
     yield from edges.findings(edges.coarsest(path, path.last))
     yield from resticking.findings(resticking.furthest(path))
+    yield from creases.findings(creases.deepest(path))
 
 
 @register("end")
