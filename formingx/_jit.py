@@ -70,13 +70,13 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 
     Args:
         comm: MPI communicator.
-        items: {key: UFL form, or (UFL expression, points)}, with the keys of the function `key`.
+        items: {name of the library: UFL form, or (UFL expression, points)}; the function `key` makes the names.
         jit_options: options of the C compiler and of the cache (`dolfinx.jit.get_options`).
         form_options: options of FFCx (`ffcx.get_options`).
 
     Returns:
-        {key: (object of FFCx, namespace with its `ffi` and its library, (None, None))}, as `dolfinx.jit.ffcx_jit`
-        returns for one form.
+        {name of the library: (object of FFCx, namespace with its `ffi` and its library, (None, None))}, as
+        `dolfinx.jit.ffcx_jit` returns for one form.
 
     Raises:
         RuntimeError: the compiler failed. On ranks other than 0: FFCx refused an item on rank 0.
@@ -98,7 +98,13 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 
 def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
             ) -> dict[str, Any]:
-    """Return {key: compiled object} of all items; build the missing libraries in the cache `folder`.
+    """Return {name of the library: result of `_load`} of all items; build the missing libraries.
+
+    Args:
+        items: {name of the library: UFL form, or (UFL expression, points)}.
+        folder: folder of the cache.
+        form_options: options of FFCx.
+        jit_options: options of DOLFINx for the C compiler.
 
     Raises:
         RuntimeError: the compiler failed, or a new library cannot be loaded.
@@ -124,7 +130,7 @@ def _load(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
 
     Args:
         ffi: declarations of FFCx.
-        name: key of the form, the name of its library.
+        name: name of the library, from the function `key`.
         item: UFL form, or (UFL expression, points).
         folder: folder of the library.
     """
@@ -152,10 +158,10 @@ def _declarations(scalar: str) -> cffi.FFI:
 
 
 def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], form_options: dict[str, Any]) -> None:
-    """Build one library with all items, and link it in the cache under the key of each item.
+    """Build one library with all items, and link it in the cache under the name of each item.
 
     Args:
-        items: {key: UFL form, or (UFL expression, points)}.
+        items: {name of the library: UFL form, or (UFL expression, points)}.
         folder: folder of the cache.
         jit_options: options of DOLFINx for the C compiler.
         form_options: options of FFCx.

@@ -150,8 +150,8 @@ def solve(scene: Scene, *, to: float, increments: int = 1, tolerances: Tolerance
         increments: number of equal increments. An increment that fails is halved, and new contact shortens increments.
         tolerances: convergence criteria; default `Tolerances()`.
         max_steps: largest number of accepted states.
-        record: see `trace`.
-        allow_inadmissible: see `trace`.
+        record: {name: quantity} of additional columns: a function of the `Problem` that returns a number, or a target.
+        allow_inadmissible: continue through states that no body can have, such as self-penetrated ones.
 
     Returns:
         The path with all accepted states.
@@ -217,21 +217,24 @@ class Process:
 
         Args:
             stages: the stages.
-            step: step control at the start of stages without their own; default `StepControl()`. In a stage that
-                prescribes another quantity than the control over time, its lengths are fractions of the duration.
+            step: step control at the start of stages without their own; default `StepControl()`. In a stage in which
+                an output quantity follows a table over time, its lengths are fractions of the duration.
             tolerances: convergence criteria; default `Tolerances()`.
             max_steps: largest number of accepted states of a stage, or of a linear piece of its tables. Default: the
                 run ends when it no longer approaches its target.
             progress: show a progress bar on runs of more than two seconds (rank 0).
             start: path of these stages to be continued, for example from `formingx.load`, or one of its states.
             checkpoint: folder to which every accepted state is written (`formingx.load`).
-            record: see `trace`.
+            record: {name: quantity} of additional columns: a function of the `Problem` that returns a number, or a
+                target.
             accuracy: accuracy of the time integration of viscoelastic materials: "draft", "standard" or "fine" (1, 0.2,
                 0.03 % of stress and thickness), or the relative error.
             resume: continue from the states in the checkpoint, which must be of this process; begin if there are none.
-            allow_inadmissible: see `trace`.
-            adapt_mesh: see `trace`.
-            remesh: see `trace`.
+            allow_inadmissible: continue, with a warning, through states that no body can have, such as self-penetrated
+                ones. By default the run ends there.
+            adapt_mesh: True to run twice: on the mesh of the scene, and on `mesh.adapted(path)`; or {argument of
+                `adapted`: value}.
+            remesh: a `Remesh`, which replaces crushed elements by a new mesh of the deformed body.
 
         Returns:
             The path with the states of all stages; every stage begins with a state of kind "start".

@@ -90,7 +90,7 @@ class Units:
         return _UnitsPerDepth(self.length, self.stress, self.time)
 
     def _whole(self, unit: str) -> str:
-        """Return a unit of an integral over the body, such as its volume; in plane strain per unit of depth."""
+        """Return the unit of an integral over the whole body, such as "N"; the subclass divides it by the depth."""
         return unit
 
     @property
@@ -166,7 +166,7 @@ class _UnitsPerDepth(Units):
     """Units of the numbers of a script in plane strain, per unit depth."""
 
     def _whole(self, unit: str) -> str:
-        """Return a unit of an integral over the body, divided by the unit of length."""
+        """Return the unit of an integral over a body, such as "N", divided by the unit of the depth: "N/mm"."""
         return f"{unit}/{self.length or 'cm'}" if unit else ""
 
 

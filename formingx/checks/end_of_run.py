@@ -19,7 +19,10 @@ def inadmissible(path: Any) -> Iterator[Finding]:
 
 @register("end")
 def volumes(path: Any) -> Iterator[Finding]:
-    """Report elements that do not keep their volumes in the last state of a `Path`; collective."""
+    """Report elements of a `Path` whose volume ratio J is not 1 in the last state; collective.
+
+    The root mean square of J - 1 is above 0.005, or J at a point is not between 1/2 and 2.
+    """
     error = path.last.measures["volume_error"]
     yield from volume.findings(error, "the last state", volume.away_from_clamps(path) if error > NOTICEABLE else None)
     yield from volume.extreme_ratio(path)

@@ -93,7 +93,7 @@ class Body(Triangles):
                     PrescribedValue(item, str(item.quantity), value, f"the table of {name!r} in {stage.label}"))
 
     def format(self, value: float, kind: str, digits: int = 4) -> str:
-        """Return a number with its unit as text.
+        """Return a number with its unit as text, such as "0.25 MPa".
 
         Args:
             value: the number.
@@ -103,7 +103,7 @@ class Body(Triangles):
         return f"{value:.{digits}g} {self._units.unit_of(kind)}".rstrip()
 
     def _prescribed_values(self, target: Target, control: Any) -> list[PrescribedValue]:
-        """Return a list with the pressure or travel at which a target is met; empty for targets of other quantities.
+        """Return a list with the prescribed value of a target that is a pressure or a travel; else an empty list.
 
         Args:
             target: the target.
@@ -193,13 +193,13 @@ class PressurisedFace:
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def remaining_pressure(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """Return the lowest pressure of a free tube between its pressure maximum and a blow ratio.
+        """Return the lowest pressure of a free tube from its pressure maximum to the hoop stretch in the mould.
 
         Args:
-            blow_ratio: hoop stretch of the tube in the mould: radius of the mould over radius of the parison.
+            blow_ratio: this hoop stretch: radius of the mould over radius of the parison.
 
         Returns:
-            The lowest pressure over the maximum, and the maximum. None if there is no maximum below the blow ratio.
+            Lowest pressure over pressure maximum, and the maximum. None without a maximum below the blow ratio.
         """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
@@ -284,10 +284,9 @@ def _blow_ratio(body: Body) -> Found:
 
 @register("scene")
 def _open_moulds(body: Body) -> Found:
-    """Report a mould without a surface straight ahead of a part of the sheet, if the sheet would be blown past its end.
+    """Report an open mould: parts of the sheet meet no tool along their normal, and would be blown past its end.
 
-    This is so if a pressure of the run is larger than a free sheet bears, or if the mould is deep and no target ends
-    the run.
+    For this a pressure of the run is larger than a free sheet bears, or the mould is deep and no target ends the run.
     """
     for face in body.pressurised_faces:
         if not face.tools:
@@ -388,14 +387,14 @@ def _tool_paths(body: Body) -> Found:
 
 def _gaps(faces: list[tuple[Tool, np.ndarray]], direction: Any, start: float, travel_range: float,
           tolerance: float) -> np.ndarray:
-    """Return the gaps of moving tools (`_gap`) at positions in order, up to the first touch or the end, shape (n,).
+    """Return the smallest gap between tools and undeformed faces at n increasing travels, shape (n,), length.
 
-    From one position to the next the tools move by half the gap or the tolerance, so they pass no face.
+    The last travel is the first touch, or `travel_range`. The travel grows by half the gap, at least the tolerance.
 
     Args:
         faces: pairs (tool, nodes of the face that it touches, shape (n, c), length).
         direction: displacement of all tools per travel, shape (c,).
-        start: gap without travel, length.
+        start: smallest gap at the travel 0, length.
         travel_range: largest travel, length.
         tolerance: gap up to which a tool touches a face, length.
     """

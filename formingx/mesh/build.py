@@ -212,7 +212,8 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
     Args:
         inner_radius: inner radius, length.
         thickness: a length (one layer, called `wall`), or {layer name: its thickness} from the inside out.
-        elements: (number from the axis to the equator, division of the layers as in `disc`).
+        elements: (number from the axis to the equator, division of the layers). The division is a number of elements
+            through each layer, or a list with an entry for each layer: a number, or relative sizes from the inside out.
         grading: size of the element at the equator over the size of the element at the axis, along the meridian.
         comm: MPI communicator.
 
@@ -220,7 +221,7 @@ def sphere(*, inner_radius: float, thickness: float | Mapping[str, float], eleme
         The mesh, of quadratic triangles.
 
     Raises:
-        InputError: as in `disc`.
+        InputError: a size is not positive, or a count is not a positive integer.
 
     >>> list(fx.mesh.sphere(inner_radius=1.0, thickness=0.2, elements=(8, 2)).boundaries)
     ['axis', 'equator', 'inner', 'outer']
@@ -250,9 +251,11 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
             a function of Z, or a table {Z: thickness}, interpolated linearly. Z is the height on the inner face, from
             -inner_radius to `length`. The thickness is measured along the normal.
         length: length of the tube above the half sphere, length.
-        accuracy: "draft", "standard" or "fine": a `Scene` with a tool chooses the elements, as for a `disc`.
-        elements: (number from the axis to the neck, division of the layers as in `disc`), in place of `accuracy`;
-            default (60, 2).
+        accuracy: "draft", "standard" or "fine": a `Scene` chooses the elements where a tool touches the wall, short
+            ones at its fillets. A given `elements` or `grading` is kept.
+        elements: (number from the axis to the neck, division of the layers), in place of `accuracy`; default (60, 2).
+            The division is a number of elements through each layer, or a list with an entry for each layer: a number,
+            or relative sizes from the inside out.
         grading: size of the element at the neck over the element at the axis.
         comm: MPI communicator.
 
@@ -260,7 +263,8 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
         The mesh, of quadratic triangles.
 
     Raises:
-        InputError: as in `disc`; there are fewer than two elements along the meridian.
+        InputError: a size is not positive, or a count is not a positive integer. There are fewer than two elements
+            along the meridian. The thickness is not given at every height.
 
     >>> wall = {-10.0: 2.0, 60.0: 3.0}                                         # at heights of the inner face
     >>> tube = fx.mesh.parison(inner_radius=10.0, thickness=wall, length=60.0, elements=(20, 1))
@@ -314,8 +318,9 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
     Args:
         inner: corners (R, Z) of the inner face, shape (n, 2), n > 1, length.
         outer: corners (R, Z) of the outer face, shape (n, 2), length.
-        elements: (number between successive corners, division of the layers as in `disc`). The first entry may be a
-            list of n - 1 numbers, one for each interval.
+        elements: (number between successive corners, division of the layers). The first entry may be a list of n - 1
+            numbers, one for each interval. The division is a number of elements through each layer, or a list with an
+            entry for each layer: a number, or relative sizes from `inner` to `outer`.
         layers: {layer name: thickness of the layer relative to the other layers} from `inner` to `outer`; default one
             layer, `wall`.
         comm: MPI communicator.
@@ -383,17 +388,18 @@ def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray
           through: list[np.ndarray], sides: tuple, comm: MPI.Comm) -> Mesh:
     """Return the mesh of quadratic triangles on rows and columns of nodes.
 
-    Each rectangle of a column is divided into two triangles. The diagonals alternate in each layer as on a chessboard.
+    Each rectangle of four corners is divided into two triangles. In each layer the diagonals alternate as on a
+    chessboard.
 
     Args:
         kind: name of the body, for messages.
-        place: function of coordinates along the body, shape (k,), that returns the nodes of all rows, shape
-            (rows, k, 2), length.
+        place: function of k coordinates along the body, shape (k,), that returns the nodes (R, Z) of all rows there,
+            shape (rows, k, 2), length.
         ends: coordinates of the ends of the columns of elements, shape (n + 1,).
-        fixed: coordinates at which columns must also end if the body is divided anew, shape (m,).
-        layers: names of the layers.
+        fixed: coordinates of the ends that another mesh of this body must keep (`Columns.fixed`), shape (m,).
+        layers: names of the layers, the first row of nodes first.
         through: ends of the elements through each layer on [0, 1].
-        sides: names of the boundaries at the first and the last column, and at the first and the last row.
+        sides: names of the four boundaries: first column, last column, first row, last row.
         comm: MPI communicator.
     """
     points = place(with_middles(ends))

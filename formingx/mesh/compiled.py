@@ -68,5 +68,9 @@ void cross(long pairs, const long *first, const long *second, const double *poin
 
 
 def compiled() -> Any:
-    """Return an object with the functions `overlaps` (boxes) and `cross` (edges) in C, compiled at the first call."""
+    """Return an object with two functions in C, compiled at the first call.
+
+    `overlaps` counts the pairs of boxes that overlap or touch, and writes their indices to an array. `cross` finds the
+    pairs of edges that cross, or touch anywhere but in a common node.
+    """
     return functions("mesh", _HEADER, _SOURCE)

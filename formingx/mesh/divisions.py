@@ -18,7 +18,8 @@ def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) ->
 
     Args:
         kind: name of the calling function, for error messages.
-        thickness: argument of that function: a thickness, see `Thickness`, or {layer name: thickness}.
+        thickness: argument of that function: a thickness or {layer name: thickness}. A thickness is a length, a
+            function of the coordinate, or a table {coordinate: length}.
         alone: name of the layer if `thickness` names none.
         coordinate: coordinate along which the thickness may vary, "R" or "Z"; "" if it must be constant.
 
@@ -107,7 +108,8 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
     Args:
         kind: name of the calling function, for error messages.
         along_what: direction along the sheet, such as "radius", for error messages.
-        elements: argument of that function: (number along the sheet, division of the layers), see `disc`.
+        elements: argument of that function: (number along the sheet, division of the layers). The division is a number
+            of elements through each layer, or a list with an entry for each layer: a number, or relative sizes.
         layers: number of layers.
 
     Returns:

@@ -190,15 +190,15 @@ def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
 
 def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
                    points: np.ndarray) -> list[list[int]]:
-    """Return the node numbers of boundary edges: ends and middle of each; [] if no edge belongs to an element.
+    """Return [first end, last end, middle] of each boundary edge, as node numbers; [] if no edge is part of an element.
 
-    So a curve that is no part of the body, such as a tool in the same file, gives an empty boundary.
+    Edges of three-node triangles have no middle. A curve outside the body, such as a tool in the same file, gives [].
 
     Args:
         edges: node numbers of the ends of the edges, shape (k, 2); -1 for a node of no element.
-        known: {(lower end, higher end): [middle]} of the edges of elements.
+        known: {(lower, higher node number of the ends): [node number of the middle]} of all edges of elements.
         caller: beginning of the message.
-        points: nodes (R, Z), shape (n, 2), length.
+        points: nodes (R, Z), shape (n, 2), length, for the message.
 
     Raises:
         InputError: some edges belong to elements, others do not.

@@ -36,13 +36,14 @@ class Columns(NamedTuple):
 
 
 class Preset(NamedTuple):
-    """Accuracy that a script requests for a sheet, and the function that divides the sheet into other elements.
+    """Accuracy that a script requests for the elements of a sheet, and the function that meshes the sheet again.
 
     Attributes:
         accuracy: "draft", "standard" or "fine".
         thickness: largest thickness of each layer, shape (layers,), length.
         through: number of elements through each layer.
-        make: function of other ends of columns and other numbers of elements through each layer; returns the mesh.
+        make: function that returns a mesh of the same sheet. Its arguments are the coordinates along the sheet of the
+            ends of the n columns, shape (n + 1,), and the number of elements through each layer.
     """
 
     accuracy: str
@@ -183,7 +184,7 @@ class Mesh:
             limits: lowest and highest coordinate of the part, length.
             axis: 0 for R, 1 for Z.
             tolerance: largest distance of an end from a limit, length.
-            part: arguments of `with_part`.
+            part: arguments of `with_part`: (name, of, within, along).
 
         Returns:
             The columns; None if the mesh has none.

@@ -105,8 +105,8 @@ def read(file: str | os.PathLike) -> Grid:
     """Return the grid in a gmsh file; physical groups name the layers (dimension 2) and the boundaries (dimension 1).
 
     Raises:
-        InputError: the file is missing or damaged (`content`). There is no physical group of dimension 2, an element is
-            not a triangle, or the body is not in a plane of constant z.
+        InputError: the file is missing or damaged. There is no physical group of dimension 2, an element is not a
+            triangle, or the body is not in a plane of constant z.
     """
     file = os.fspath(file)
     found = content(file)
@@ -215,7 +215,7 @@ def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
 def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
     """Return the format of a file from its section $MeshFormat.
 
-    The result is (version, True if binary, byte order "<" or ">", number of bytes of a size).
+    The result is (version, True if binary, byte order "<" or ">", number of bytes of a count: 4 or 8).
 
     Raises:
         InputError: the version is not supported.
@@ -294,9 +294,11 @@ def _elements_2(section: Section) -> list[Block]:
 def _groups(section: Section, whole: dict | None = None) -> dict[tuple[int, int], tuple[int, ...]]:
     """Return {(dimension, entity): numbers of its physical groups} from a section of an MSH 4.1 file.
 
+    An entity is a point, curve, surface or volume of the geometry. A part of an entity is in the groups of the whole.
+
     Args:
         section: the section $Entities or $PartitionedEntities.
-        whole: groups of the entities that were partitioned; None for $Entities.
+        whole: for $PartitionedEntities the result of the section $Entities, else None.
     """
     found = {}
     if whole is not None:

@@ -15,7 +15,7 @@ class Section:
         body: content of the section.
         binary: True in a binary file.
         order: byte order, "<" or ">".
-        width: number of bytes of a size, 4 or 8.
+        width: number of bytes of a count, and in MSH 4.1 of a node or element number, 4 or 8.
         where: name of the section, for error messages.
     """
 

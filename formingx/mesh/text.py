@@ -163,15 +163,15 @@ def _checked_numbering(numbering: str, lines: _Lines | None = None) -> str:
 
 
 def _new_name(lines: _Lines, words: Sequence[str], taken: Any) -> str:
-    """Return the name of a new layer or boundary from the first line of its block.
+    """Return the name of a layer or boundary from the first line of its block, such as "boundary 10 bottom".
 
     Args:
         lines: lines of the file, for messages.
-        words: words of the first line of the block.
-        taken: names of the layers or boundaries before.
+        words: words of this line; the name begins with the third.
+        taken: names of the earlier layers or boundaries.
 
     Raises:
-        InputError: a block before has the same name.
+        InputError: an earlier layer or boundary has this name.
     """
     name = " ".join(words[2:])
     if name in taken:

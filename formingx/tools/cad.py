@@ -34,7 +34,8 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
             file; None if arcs may not replace them.
 
     Returns:
-        {number: function that returns the pieces of the curve, or raises its error}.
+        {number of a curve: function without arguments that returns its lines and arcs}. The function raises an
+        InputError if the curve is outside the plane, or needs a tolerance.
 
     Raises:
         InputError: the file cannot be read.
@@ -66,7 +67,7 @@ class _Reader:
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
 
     def __enter__(self) -> _Reader:
-        """Wait until the separate process has read the file, store the parameter ranges, and return the reader."""
+        """Return the reader, once the separate process has read the file and `bounds` has the curves."""
         try:
             self.bounds = {int(tag): ends for tag, ends in self._answer()["curves"].items()}
         except BaseException:
@@ -80,7 +81,10 @@ class _Reader:
         self._process.communicate()
 
     def evaluate(self, tag: int, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return points and derivatives of curve `tag`, shape (n, 3) each, at `parameters`, shape (n,)."""
+        """Return n points of curve number `tag`, and their derivatives by its parameter, shape (n, 3) each.
+
+        parameters: values of the curve parameter, shape (n,).
+        """
         points, derivatives = self._answer([tag, parameters.tolist()])
         return np.array(points).reshape(-1, 3), np.array(derivatives).reshape(-1, 3)
 

@@ -13,7 +13,10 @@ import sys
 
 
 def main(file: str, kind: str, seconds: int) -> None:
-    """Read the file, print its curves, then evaluate curves as lines of standard input request, until these end.
+    """Read the file, print its curves, then answer requests for points of the curves, until standard input ends.
+
+    A request is a line of JSON, [number of a curve, [parameters]]. Its answer is the line [coordinates of the points,
+    coordinates of their derivatives by the parameter].
 
     Args:
         file: name of the file.

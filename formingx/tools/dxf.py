@@ -26,11 +26,11 @@ def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callab
             file; None if arcs may not replace them.
 
     Returns:
-        {number: function that returns the pieces of the curve}.
+        {number of a curve: function without arguments that returns its lines and arcs}. The function raises an
+        InputError if the curve is outside the plane, or a spline or an ellipse without a tolerance.
 
     Raises:
-        InputError: ezdxf is not installed, or the file cannot be read. A curve is of another kind or outside the plane,
-            or there is a spline without a tolerance.
+        InputError: ezdxf is not installed, or the file cannot be read.
     """
     try:
         import ezdxf
@@ -87,7 +87,12 @@ def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
 
 def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the lines and arcs of a DXF entity by the function for its kind, with the arguments of `_pieces`.
+    """Return the lines and arcs of a DXF entity, made by the function for its kind.
+
+    Args:
+        entity: the entity of ezdxf.
+        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, length, or None.
+        name: beginning of the error message.
 
     Raises:
         InputError: the kind is not supported, or the curve lies in another plane.

@@ -20,15 +20,15 @@ _HEADERS = {"step": (b"ISO-10303-21",), "brep": (b"DBRep_DrawableShape", b"CASCA
 _KINDS = {".geo": "geo", ".msh": "msh", ".dxf": "dxf", ".step": "step", ".stp": "step", ".brep": "brep"}
 
 _Curves = dict[int, Callable[[], list[Line | Arc]]]
-"""{number of a curve: function that returns its pieces, or raises its error}."""
+"""{number of a curve: function that returns its lines and arcs, or raises an InputError}."""
 
 
 def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: bool = False, *,
          tolerance: float | None = None, body: Any = None, units: str | float | Units | None = None) -> Tool:
     """Return a tool from curves of a file.
 
-    Lines and circular arcs are exact; curves of a mesh (.msh) are polylines through its nodes. The ending of the name
-    gives the format: .step or .stp, .brep, .dxf, .msh or .geo. The curves lie in the plane z = 0.
+    The ending of the name gives the format: .step or .stp, .brep, .dxf, .msh or .geo. The curves lie in the plane
+    z = 0. Lines and circular arcs are exact; in a mesh (.msh) the nodes of a curve must lie on one of them.
 
     A .geo file is a script, but it is not run. It may contain points, lines, circles and named numbers; loops, surfaces
     and physical groups are skipped. Invisible curves of a .dxf file are skipped, too.
@@ -197,7 +197,10 @@ def _scaled(piece: Line | Arc, factor: float) -> Line | Arc:
 
 
 def _geo_curves(file: str) -> _Curves:
-    """Return {number: function that returns the pieces, or raises an error} of the curves of a .geo file."""
+    """Return {number of a curve: function that returns its line or arc in a list} for a .geo file.
+
+    The function raises an InputError for other curves.
+    """
     def pieces(tag: int, piece: Line | Arc | str) -> list[Line | Arc]:
         if isinstance(piece, str):
             raise InputError(f"tool file {file!r}: curve {tag} is a {piece}, which is read from no .geo file: export it"
@@ -207,7 +210,10 @@ def _geo_curves(file: str) -> _Curves:
 
 
 def _mesh_curves(file: str) -> _Curves:
-    """Return {number: function that returns the pieces, or raises an error} of the curves of a .msh file."""
+    """Return {number of a curve: function that returns the line or arc through its nodes, in a list} for a .msh file.
+
+    The function raises an InputError if the nodes lie on no line or circle, or the elements are not in order.
+    """
     found = msh.content(file)
     points = dict(zip(map(int, found.numbers), found.points))
     lines: dict[int, list[tuple[int, int]]] = {}

@@ -41,10 +41,10 @@ def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
         file: name of the file.
 
     Returns:
-        {number: a line or an arc, or the kind of another curve}.
+        {number of a curve: a line or an arc, or the kind of another curve, such as "Spline"}.
 
     Raises:
-        InputError: the file cannot be read, or contains another statement; the message names the line.
+        InputError: the file cannot be read, or contains a statement that is not supported; the message names the line.
     """
     file = os.fspath(file)
     try:
@@ -68,8 +68,8 @@ class _Drawing:
 
     Attributes:
         values: {name: number}.
-        points: {number of a point: (x, y), shape (2,)}.
-        curves: {number of a curve: line or arc, or the kind of another curve}.
+        points: {number of a point: (x, y), shape (2,), length}.
+        curves: {number of a curve: line or arc, or the kind of another curve, such as "Spline"}.
     """
 
     def __init__(self) -> None:
@@ -98,7 +98,7 @@ class _Drawing:
             self.values[name.strip()] = self._number(value)
 
     def _add_point(self, tag: int, numbers: list[float]) -> None:
-        """Add point `tag` with the numbers (x, y, 0) or (x, y, 0, mesh size).
+        """Add the point with the number `tag`; `numbers`: (x, y, 0) or (x, y, 0, mesh size), length.
 
         Raises:
             ValueError: the point lies outside the plane, or its number is used already.
@@ -110,20 +110,21 @@ class _Drawing:
         self.points[tag] = np.array(numbers[:2])
 
     def _add_line(self, tag: int, numbers: list[float]) -> None:
-        """Add line `tag` between the two points with these numbers.
+        """Add the line with the number `tag`; `numbers`: point numbers of its two ends.
 
         Raises:
-            ValueError: there are not two numbers.
+            ValueError: there are not two numbers, there is no such point, or `tag` is used already.
         """
         if len(numbers) != 2:
             raise ValueError("a line must be {first point, last point}")
         self._add_curve(tag, Line(*(self._point(n) for n in numbers)))
 
     def _add_circle(self, tag: int, numbers: list[float]) -> None:
-        """Add circular arc `tag`.
+        """Add the circular arc with the number `tag`.
 
-        An arc below 180 degrees has the numbers {first point, centre, last point}. Any arc may have the numbers {x, y,
-        0, radius, first angle, last angle}, without the angles for a full circle.
+        Of an arc below 180 degrees, `numbers` are the point numbers of the first end, the centre and the last end. Any
+        arc may have (x, y, 0, radius, first angle, last angle): the centre, length, and angles from the x axis,
+        radians. A full circle needs no angles.
 
         Raises:
             ValueError: the two ends differ in their distance from the centre, or the numbers do not define an arc.
@@ -144,7 +145,7 @@ class _Drawing:
             raise ValueError("a circle must be {first point, centre, last point}")
 
     def _add_curve(self, tag: int, piece: Line | Arc | str) -> None:
-        """Add a curve with the number `tag`: a line or an arc, or the kind of another curve.
+        """Add a curve with the number `tag`; `piece`: line or arc, or the kind of another curve, such as "Spline".
 
         Raises:
             ValueError: the number is used already.
@@ -154,7 +155,7 @@ class _Drawing:
         self.curves[tag] = piece
 
     def _point(self, number: float) -> np.ndarray:
-        """Return the point (x, y) with a number, shape (2,).
+        """Return the point (x, y) that the script numbers `number`, shape (2,), length.
 
         Raises:
             ValueError: there is no such point.

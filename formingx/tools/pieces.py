@@ -138,8 +138,8 @@ def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn
         corner: the corner (R, Z), shape (2,), length.
         radius: radius of the arc, length.
         cut: length by which the arc shortens each edge at the corner, length.
-        incoming: direction of the edge before the corner, radians.
-        turn: angle between the edges, positive to the left, radians.
+        incoming: polar angle of the direction of the edge before the corner, radians.
+        turn: angle from this direction to the direction of the edge after the corner, positive to the left, radians.
         first: True if the edge before the corner exists, False at the first point of an open profile.
         second: True if the edge after the corner exists, False at the last point of an open profile.
     """
@@ -194,7 +194,7 @@ def checked(piece: Line | Arc, i: int) -> Line | Arc:
 
 
 def turn_angle(incoming: float, outgoing: float) -> float:
-    """Return the angle from a direction to the next one along the profile, positive to the left, radians, in (-pi, pi].
+    """Return the angle from one direction to the next along a profile, positive to the left, radians, in (-pi, pi].
 
     Args:
         incoming: polar angle of the first direction, radians.

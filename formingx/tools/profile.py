@@ -52,7 +52,10 @@ class Tool:
         closed: True to join the last point to the first.
 
     Attributes:
-        table: lines, then arcs of the profile, shape (pieces, 9), as `formingx.tools.nearest.nearest` takes them.
+        pieces: lines and arcs in their order along the profile.
+        closed: True if the last point is the first.
+        size: largest extent of the profile, or its largest arc radius if that is larger, length.
+        table: numbers of the pieces for `formingx.tools.nearest.nearest`, lines first, shape (pieces, 9).
         lines: number of lines.
 
     Raises:
@@ -147,13 +150,14 @@ class Tool:
             x: points, shape (n, 2), length.
 
         Returns:
-            Distances, positive inside the tool; gradients; curvatures (`Nearest`).
+            Distances, positive inside the tool, shape (n,), length; gradients, shape (n, 2); curvatures, shape (n,),
+            1/length.
         """
         return Nearest(*nearest(as_points("Tool: x", x), self.table, self.lines))
 
     @property
     def compiled_table(self) -> tuple[int, int, Any]:
-        """Number of all pieces, number of lines, and address of the table of the pieces (`nearest`), for C."""
+        """Number of rows of `table`, number of lines among them, and address of `table`, for functions in C."""
         return len(self.table), self.lines, address(self.table)
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
@@ -199,10 +203,10 @@ class Tool:
         return np.vstack([parts[0], *(part[1:] for part in parts[1:])])
 
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return straight pieces that replace the profile, see `RigidTool.surface`.
+        """Return straight pieces that replace the profile, for drawing and for checks: 24 for each arc.
 
         Returns:
-            Points of `outline`, shape (n, 2), length, and numbers of the ends of each piece, shape (m, 2).
+            Points along the profile, shape (n, 2), length; row numbers of the ends of each piece, shape (n - 1, 2).
         """
         points = self.outline()
         numbers = np.arange(len(points))
@@ -227,7 +231,11 @@ class Tool:
         return Tool.of_pieces(pieces, self.closed)
 
     def _tabulate(self) -> None:
-        """Store the table of pieces for `nearest`: lines, then arcs and sharp corners (arcs of radius 0)."""
+        """Set `table`, shape (pieces, 9), from `pieces`: the lines, then arcs and sharp corners (arcs of radius 0).
+
+        End pieces of an open profile are extended: lines without end, arcs by 90 degrees. Set `lines`, the number of
+        lines, too.
+        """
         rows, arcs = [], []     # origin, direction, sense (0: line), lowest and highest coordinate; arcs: radius, start
         tol = ROUND_OFF * self.size
         ends = self._ends()
@@ -255,9 +263,9 @@ class Tool:
         """Return the corners that the profile and its mirror image form on the axis R = 0.
 
         Returns:
-            For the first and the last end: point (R, Z), and angle from the profile to its mirror image, radians. None
-            for an end off the axis, or one that meets its mirror image without a corner. There the end piece is
-            extended. A closed profile has no ends: its two points with angle 0 are no corners.
+            Two entries, for the first and the last end of the profile. An entry is (point (R, Z), angle) with the angle
+            by which the direction turns there, positive to the left, radians. It is None for an end off the axis, or
+            without a corner. For a closed profile both entries have the angle 0, which stands for no corner.
         """
         if self.closed:
             return (np.zeros(2), 0.0), (np.zeros(2), 0.0)

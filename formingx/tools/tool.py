@@ -47,5 +47,6 @@ class PlaneTool(RigidTool, Protocol):
             x: points, shape (n, 2), length.
 
         Returns:
-            Distances, positive inside the tool, gradients and curvatures (`Nearest`).
+            Distances, positive inside the tool, shape (n,), length; gradients, shape (n, 2); curvatures of the level
+            lines of the distance, shape (n,), 1/length.
         """
