@@ -47,7 +47,7 @@ def compile_expression(expression: Any, points: Any) -> Any:
 
 
 class _Numbered(MultiFunction):
-    """Map of a UFL expression to the same expression whose variables have labels with the numbers 0, 1, ..."""
+    """Map of a UFL expression to an equal one, in which labels of variables have the numbers 0, 1, ..."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -56,7 +56,7 @@ class _Numbered(MultiFunction):
     expr = MultiFunction.reuse_if_untouched
 
     def label(self, label: Label) -> Label:
-        """Return the numbered label that replaces a label of UFL, whose own number depends on earlier expressions."""
+        """Return the label that replaces the label of a UFL variable; its number is the count of labels before it."""
         return self._labels.setdefault(label, Label(len(self._labels)))
 
 

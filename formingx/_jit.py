@@ -256,7 +256,7 @@ def compile_c(command: list[str], code: str) -> None:
 
 
 def _command(jit_options: dict[str, Any]) -> list[str]:
-    """Return the words of the command that compiles C from standard input to a library, without the file name."""
+    """Return the words of the command that compiles C from standard input; the name of the library is to be added."""
     flags = [*shlex.split(sysconfig.get_config_var("CFLAGS") or ""), *shlex.split(os.environ.get("CFLAGS", "")),
              "-fPIC", "-std=c17", *jit_options["cffi_extra_compile_args"]]
     libraries = [*ffcx_jit._libraries, *(jit_options["cffi_libraries"] or ())]

@@ -9,8 +9,8 @@ import numpy as np
 def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
     """Yield estimates of the stretches that a flat axisymmetric sheet will reach.
 
-    For each target of the run, the sheet is taken as a free dome, whose largest stretch is at the pole. In a closed
-    mould, the stretch is the root of the areal draw ratio.
+    For each target of the run, it is the pole stretch of the sheet as a free spherical cap. In a closed mould, it is
+    the square root of the areal draw ratio.
 
     Args:
         body: the `Body` to be checked.
@@ -58,5 +58,8 @@ def _cap_stretch(target: Any, radius: float) -> float | None:
 
 
 def _area(line: np.ndarray) -> float:
-    """Return 1/pi times the area that a polyline of points (r, z), shape (n, 2), sweeps about the axis, length^2."""
+    """Return the area of the surface of revolution of a polyline over pi, length^2.
+
+    line: points (r, z) of the polyline, shape (n, 2), length.
+    """
     return float(np.sum((line[1:, 0] + line[:-1, 0]) * np.hypot(*np.diff(line, axis=0).T)))

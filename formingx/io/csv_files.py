@@ -97,7 +97,7 @@ def read(file: Any) -> CsvTable:
         file: name of the file.
 
     Raises:
-        InputError: the file cannot be read (`records`), has no header, or has fewer than two rows of data. It names a
+        InputError: the file cannot be read, has no header, or has fewer than two rows of data. It names a
             column twice, or has a row with more or fewer cells than the header.
     """
     name = os.fspath(file_path("table", file))

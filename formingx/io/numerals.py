@@ -26,7 +26,7 @@ def number(word: str) -> float:
         word: text without spaces, such as "1.5e-3".
 
     Raises:
-        ValueError: the text is not a number (`is_number`).
+        ValueError: the text is not a number.
     """
     if not is_number(word):
         raise ValueError(f"{word[:40]!r} is not a number")

@@ -12,7 +12,7 @@ _CHUNK = 2**18      # pairs that are compared at a time
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield the pairs of boxes that overlap or touch, in one or more arrays.
+    """Yield arrays of the pairs of boxes that overlap or touch.
 
     Args:
         low: lower corners of the boxes, shape (n, 2), finite.

@@ -127,8 +127,8 @@ class Mesh:
         Args:
             name: new name of the part.
             of: name of the boundary that contains the part.
-            within: (lowest, highest) reference coordinate of the part, length. There must be nodes at both values (see
-                `concentrate` of `disc`), unless the boundary ends before.
+            within: (lowest, highest) reference coordinate of the part, length. There must be nodes at both values,
+                unless the boundary ends before; a `disc` has nodes at the radii in its argument `concentrate`.
             along: coordinate that `within` limits, "r" or "z".
 
         Returns:

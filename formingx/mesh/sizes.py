@@ -52,9 +52,11 @@ def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, fi
 
 
 def moved_nodes(mesh: Any) -> float:
-    """Return the largest motion of a node of the two faces since the mesh was made, over the extent of the mesh.
+    """Return the largest displacement of a node of the two faces of a sheet, over the extent of the mesh.
 
-    mesh: a `Mesh` with `columns`, whose nodes a script may have moved.
+    A script may have moved nodes since the mesh was made.
+
+    mesh: a `Mesh` with `columns`.
     """
     columns = mesh.columns
     nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
