@@ -73,11 +73,16 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
                        c10: float | Callable[[float], float], c01: float = 0.0) -> MembraneState:
     r"""Return a flat circular membrane with a fixed rim, inflated to a given stretch at its pole.
 
-    Equilibrium of the meridian, with its slope theta and arc length s (Adkins and Rivlin 1952):
+    Equilibrium of the meridian under the pressure p, with its slope theta, arc length s and deformed radius r (Adkins
+    and Rivlin 1952):
 
     .. math:: \frac{d(T_1 r)}{dr} = T_2, \qquad T_1 \frac{d\theta}{ds} + T_2 \frac{\sin\theta}{r} = p
 
-    The tensions T_1 and T_2 of the Mooney material are stated in `formingx.exact.inflation`.
+    T_1 and T_2 are the meridional and circumferential tensions per deformed length. With the reference thickness h0 and
+    the stretches lambda_1 (meridional), lambda_2 = r/R and lambda_3 = 1/(lambda_1 lambda_2) they are
+
+    .. math:: T_1 = 2 h_0 \lambda_3 (\lambda_1^2 - \lambda_3^2)(c_{10} + c_{01} \lambda_2^2), \qquad
+              T_2 = 2 h_0 \lambda_3 (\lambda_2^2 - \lambda_3^2)(c_{10} + c_{01} \lambda_1^2)
 
     Args:
         pole_stretch: stretch at the pole, above 1.
@@ -137,12 +142,20 @@ def membrane_inflation(pole_stretch: float, *, radius: float, thickness: float,
 
 def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10: Callable[[float], float],
                       c01: float) -> MembraneState:
-    r"""Return the inflated membrane whose constant c10 is a function of R, see `membrane_inflation`.
+    r"""Return a flat circular membrane with a fixed rim, inflated to a given stretch at its pole, if c10 varies with R.
 
     .. math:: R N_1 \sin\theta = \frac{p r^2}{2}, \qquad \frac{d(R N_1 \cos\theta)}{dR} = N_2 - p r \lambda_1 \sin\theta
 
-    N_1 and N_2 are tensions per reference length. The pole stretch increases in steps. The secant method finds the
-    pressure of each step, for which the circumferential stretch is 1 at the rim.
+    N_1 and N_2 are the meridional and circumferential tensions per reference length, p the pressure, theta the slope of
+    the meridian and lambda_1 its stretch. R and r are the reference and deformed radius. The pole stretch increases in
+    steps. The secant method finds the pressure of each step, for which the circumferential stretch is 1 at the rim.
+
+    Args:
+        pole_stretch: stretch at the pole, above 1.
+        radius: reference radius, length.
+        thickness: reference thickness, length.
+        c10: constant of I1, stress, as a function of the reference radius R, length.
+        c01: constant of I2, stress.
 
     Raises:
         InputError: no pressure was found.

@@ -74,8 +74,11 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
     .. math:: \frac{dH}{dR} = N_2, \qquad \frac{dr}{dR} = \frac{\lambda_1 H}{R N_1}, \qquad
               \frac{dz}{dR} = \frac{\lambda_1 V}{R N_1}, \qquad R N_1 = \sqrt{H^2 + V^2}
 
-    N_1 and N_2 are the meridional and the circumferential tension per reference length, stated in
-    `formingx.exact.plug`.
+    N_1 and N_2 are the meridional and circumferential tensions per reference length, R and r the reference and deformed
+    radius, z the height. With the stretches lambda_1 (meridional) and lambda_2 = r/R and the reference thickness h0
+
+    .. math:: N_1 = 2 h_0 (\lambda_1 - \lambda_1^{-3} \lambda_2^{-2})(c_{10} + c_{01} \lambda_2^2), \qquad
+              N_2 = 2 h_0 (\lambda_2 - \lambda_2^{-3} \lambda_1^{-2})(c_{10} + c_{01} \lambda_1^2)
 
     Args:
         travel: travel of the plug from the plane of the rim, above 0, length.
@@ -200,7 +203,8 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
                                thickness: float, c10: float, mu: float) -> SlidingState:
     r"""Return the neo-Hookean membrane that slides over a flat plug with a rounded edge under Coulomb friction.
 
-    On the edge, with tensions T per deformed length, arc length s, slope phi and curvature kappa of the meridian:
+    On the edge, with the meridional and circumferential tensions T_1 and T_2 per deformed length, and with the deformed
+    radius r, arc length s, slope phi and curvature kappa of the meridian:
 
     .. math:: \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r} + \mu N \frac{f}{f + h/2}, \qquad
               N = T_1 \kappa + T_2 \frac{\sin\phi}{r}, \qquad \kappa = \frac{1}{f + h/2}

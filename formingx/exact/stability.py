@@ -51,16 +51,16 @@ def cylinder(nu: float, n: int) -> float:
     r"""Return the axial stretch at which a compressed solid cylinder buckles in one half wave along its axis.
 
     The neo-Hookean cylinder of the deformed length H lies between frictionless plates. Its mode varies as
-    cos(pi z/H) cos(n theta). Let v be the displacement of the mode, q its pressure, mu the shear modulus, lambda the
-    axial stretch and k = pi/H. Incremental equilibrium is
+    cos(pi z/H) cos(n theta), with the height z and the angle theta. Let v be the displacement of the mode, q its
+    pressure, mu the shear modulus, lambda the axial stretch and k = pi/H. Incremental equilibrium is
 
     .. math:: \mathcal{L} v = \frac{\nabla q}{\mu}, \qquad
-              \mathcal{L} = \lambda^{-1} \left(\frac{\partial^2}{\partial r^2} + \dots\right)
+              \mathcal{L} = \lambda^{-1} \left(\nabla^2 - \frac{\partial^2}{\partial z^2}\right)
               + \lambda^2 \frac{\partial^2}{\partial z^2}
 
     Three motions satisfy it, with the modified Bessel function I_n. The first is the gradient of I_n(k r). The others
     are the curl, and the curl of the curl, of axial potentials I_n(k lambda^(3/2) r); for these q is 0. The determinant
-    of their tractions on the side vanishes at the returned stretch.
+    of their tractions on the cylindrical face vanishes at the returned stretch.
 
     Args:
         nu: slenderness pi R0/H0, with the reference radius R0 and the reference length H0.
@@ -183,6 +183,9 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
 
     .. math:: \frac{P_B - P_A}{\mu} = -\int_A^B (b_\theta - b_r) \frac{R \, dR}{\lambda r^2}, \qquad
               b_\theta = \frac{r^2}{R^2}, \qquad b_r = \frac{R^2}{\lambda^2 r^2}
+
+    P_A and P_B are the pressures on the inner and outer face with the reference radii A and B. At the reference radius
+    R the deformed radius is r, and b_theta and b_r are squared stretches. mu is the shear modulus.
 
     Args:
         ratio: inner over outer reference radius, A/B.

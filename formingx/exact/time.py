@@ -47,7 +47,8 @@ class Body:
     For a block and a thin balloon s is the logarithm of the stretch. For a thick wall s is a^n - A^n, with the deformed
     and the reference inner radius a and A, and n = 2 for a tube, 3 for a sphere. The load is a sum over points. T is
     the difference of the Cauchy stresses in the principal directions 1 (along a block, along a wall) and 3 (stress-free
-    in a block, through a wall):
+    in a block, through a wall). With the principal stretches lambda_1 and lambda_3 of the body and the elastic
+    logarithmic strains w_k of branch k:
 
     .. math:: \text{load} = \sum_{i=1}^n c_i(s) \, T_i, \qquad
               T = 2 c_{10} (\lambda_1^2 - \lambda_3^2) + \sum_k \mu_k \left(e^{2 w_{k1}} - e^{2 w_{k3}}\right)
@@ -55,8 +56,10 @@ class Body:
     Attributes:
         c10: neo-Hookean constant of the equilibrium, stress.
         branches: (shear modulus mu, relaxation time tau) of each branch, stress and time.
-        direction: logarithmic strains in the three principal directions over the scalar strain e, shape (3,).
-        strain: function of s that returns the scalar strain e and de/ds at all points, shape (n,) each.
+        direction: ratios of the logarithmic strains in the principal directions 1, 2, 3 to the strain in direction 1,
+            shape (3,).
+        strain: function of s that returns the logarithmic strain e in direction 1 and de/ds at all points, shape (n,)
+            each.
         weight: function of s that returns the weight c of the load and dc/ds at all points, shape (n,) each.
         time: present time.
         s: present value of the degree of freedom.

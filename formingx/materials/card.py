@@ -23,13 +23,13 @@ _STRETCH_FRACTION = 0.97
 
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
           unit_of_time: str) -> Path:
-    """Write the card of a material as an HTML page; see `Material.report`.
+    """Write an HTML page with stress-stretch curves and the limits of a material.
 
     Args:
         material: the material.
         file: name of the HTML file.
-        temperatures: temperatures of the curves.
-        rates: Hencky rates of the curves, 1/time.
+        temperatures: temperatures at which curves are drawn, if a constant depends on the temperature.
+        rates: Hencky rates at which curves are drawn, 1/time, if the material relaxes.
         unit: unit of stress, for labels.
         unit_of_time: unit of time, for labels.
 
@@ -95,10 +95,15 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
 
 
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
-    """Return a PNG image, base64-encoded, with curves of true stress against stretch in the three tests of `MODES`.
+    """Return a PNG image, base64-encoded, with curves of true stress against stretch.
 
-    `cases` has (temperature as text, material, factor of the relaxation times) for each temperature. `rates` are Hencky
-    rates; it is empty for a material that does not relax. `unit` and `unit_of_time` are for labels.
+    It has a diagram each for uniaxial tension, pure shear and equibiaxial tension.
+
+    Args:
+        cases: (temperature as text, material, factor of the relaxation times) for each temperature.
+        rates: Hencky rates, 1/time; empty for a material that does not relax.
+        unit: unit of stress, for labels.
+        unit_of_time: unit of time, for labels.
     """
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):

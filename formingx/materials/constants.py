@@ -54,7 +54,8 @@ class Varying(ABC):
         """Return the values of the constant at quadrature points, for checks, moduli and scales.
 
         Args:
-            sample: n quadrature points of a layer.
+            sample: n quadrature points of a layer, with their positions `points`, shape (n, 2), length. Their
+                temperatures `temperature` have the shape (n,), or are None in a scene without temperature.
 
         Returns:
             Values, shape (n,).
@@ -111,7 +112,13 @@ class OfPosition(Varying):
 
 
 class OfTemperature(FunctionOfTemperature, Varying):
-    """Material constant that is a function of the temperature of the scene, see `FunctionOfTemperature`."""
+    """Material constant that is a function f(T) of the temperature T of the scene.
+
+    Args:
+        function: the function f: a `Table`, or a function of an array of temperatures, shape (n,).
+        words: name of the function in messages; default a name made from the function.
+        limits: lowest and highest temperature at which f is known; default the limits of f, or none.
+    """
 
     def values(self, sample):
         if sample.temperature is None:

@@ -57,7 +57,8 @@ class Response:
 
         Args:
             stretches: principal stretches (l1, l2), shape (2, n); l3 = 1/(l1 l2).
-            constants: values of the constants of the energy, in their order in `Response`.
+            constants: values of the constants of the energy, in the order of the argument `names` of this class, each a
+                number or of shape (n,).
 
         Returns:
             Stresses P in directions 1 and 2, shape (2, n), stress.
@@ -74,7 +75,8 @@ class Response:
 
         Args:
             stretches: principal stretches (l1, l2, l3), shape (3, n).
-            constants: values of the constants of the energy, in their order in `Response`.
+            constants: values of the constants of the energy, in the order of the argument `names` of this class, each a
+                number or of shape (n,).
 
         Returns:
             First derivatives, shape (3, n), and second derivatives, shape (3, 3, n), stress.
@@ -93,7 +95,8 @@ class Response:
 
         Args:
             stretches: principal stretches (l1, l2), shape (2, n); l3 = 1/(l1 l2).
-            constants: values of the constants of the energy, in their order in `Response`.
+            constants: values of the constants of the energy, in the order of the argument `names` of this class, each a
+                number or of shape (n,).
 
         Returns:
             Gradient g, shape (2, n), and Hessian K, shape (2, 2, n), stress.
@@ -169,18 +172,20 @@ class Stability(NamedTuple):
 
 
 def stability(response: Response, constants: Any, low: float, high: float) -> Stability:
-    """Return the ranges of stretch in which a material is stable in the tests of `MODES`, see `Stability`.
+    """Return the ranges of stretch in which a material is stable in uniaxial tension, pure shear, equibiaxial tension.
 
-    The end of a range is searched for at 400 stretches of equal ratio, then by bisection.
+    A range extends from the stretch 1 to both sides, as far as a criterion holds. The criteria are a finite stress, a
+    force that increases with the stretch, and Drucker's criterion. The end of a range is searched for at 400 stretches
+    of equal ratio, then by bisection.
 
     Args:
         response: derivatives of the energy of the material.
-        constants: values of the constants, in the order of `Response`.
+        constants: values of the constants, numbers, in the order in which `response` was given their names.
         low: lowest examined stretch, at most 1.
         high: highest examined stretch, 1 or larger.
 
     Returns:
-        The ranges.
+        The examined range and, for each criterion, {test: (lowest, highest stretch)}.
     """
     constants = list(constants)
 
@@ -241,7 +246,9 @@ class _Program:
     def __call__(self, stretches: np.ndarray, constants: Any) -> np.ndarray:
         """Return the values of the UFL expressions, shape (outputs, n).
 
-        stretches: principal stretches, shape (3, n). constants: constants of the energy, in the order of `inputs`.
+        Args:
+            stretches: principal stretches, shape (3, n).
+            constants: constants of the energy, in the order of `inputs`, each a number or of shape (n,).
         """
         values = [*stretches, *constants]
         for operation, operands in self._steps:
@@ -251,10 +258,11 @@ class _Program:
 
 @functools.lru_cache
 def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
-    """Return programs for the 3 first derivatives of an energy W by the stretches, and for these with 6 second ones.
+    """Return two programs for the derivatives of an energy W by the principal stretches.
 
-    W is a UFL expression of `_STRETCHES` and of the first n entries of `_CONSTANTS`. The second derivatives follow in
-    the order 11, 12, 13, 22, 23, 33.
+    The first has three outputs, the first derivatives. The second has nine: the first derivatives, then the second
+    derivatives 11, 12, 13, 22, 23, 33. W is a UFL expression of `_STRETCHES` and of the first n entries of
+    `_CONSTANTS`.
     """
     inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
     W = expand_indices(expand_derivatives(W))

@@ -35,5 +35,5 @@ class IntegralLaw(Protocol):
             coefficients: {name of a coefficient: its function (UFL)}.
 
         Returns:
-            Virtual work (UFL, stress), or None.
+            Virtual work (UFL, stress); None if the stress derives from a potential.
         """

@@ -138,9 +138,10 @@ class Material(Energies):
 
     @property
     def rest_stress(self) -> float:
-        r"""Stress of the energy in the reference configuration, which the forms remove, stress.
+        r"""Nominal stress that the strain energy alone gives in the reference configuration, in the unit of stress.
 
-        For an energy W that is a function of the invariants I1 and I2
+        By default a solid subtracts :math:`\sigma_0 \ln J` from the energy W, so that this configuration is free of
+        stress. If W is a function of the invariants I1 and I2
 
         .. math:: \sigma_0 = \left.\frac{\partial W}{\partial F_{11}}\right|_{F = I}
                   = 2 \frac{\partial W}{\partial I_1} + 4 \frac{\partial W}{\partial I_2}
@@ -149,7 +150,10 @@ class Material(Energies):
 
     @functools.cached_property
     def response(self) -> Response:
-        """Derivatives of the strain energy by the principal stretches, as functions of stretches and constants."""
+        """Derivatives of the strain energy by the principal stretches, at many stretches at once.
+
+        The methods of `Response` take stretches, shape (2 or 3, n), and the constants in the order of `parameters`.
+        """
         return Response(self.strain_energy, list(self.parameters))
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), *, true: bool = False) -> np.ndarray:

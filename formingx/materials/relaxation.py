@@ -108,9 +108,10 @@ class RelaxingMaterial(Material):
 
     @property
     def rest_stress(self) -> float:
-        """Stress dW/dF11 of the equilibrium energy W at F = I, stress; 0 if all stress relaxes.
+        """Nominal stress dW/dF11 of the equilibrium energy W at F = I, in the unit of stress; 0 if all stress relaxes.
 
-        The forms remove it. Relaxing branches are stress-free at F = I.
+        By default a solid subtracts this stress times ln J from W, to be stress-free at F = I. Relaxing branches are
+        stress-free there.
         """
         return 0.0 if (rest := self.equilibrium) is None else rest.rest_stress
 

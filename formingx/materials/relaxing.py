@@ -38,9 +38,12 @@ class GeneralisedMaxwell(RelaxingMaterial):
 
     .. math:: W = W_{eq}(F) + \sum_k \frac{\mu_k}{2} \left[\mathrm{tr}(\bar C M_k) - 3\right]
 
-    The stress derives from W. The tensor M_k describes the elastic strain of branch k, see
-    `formingx.materials.relaxing`. The constants are the constants of the equilibrium energy, then mu_1, tau_1, mu_2,
-    and so on. Without times, `strain_energy`, `shear_modulus` and `stress` give the response before any relaxation.
+    The stress derives from W. W_eq is the equilibrium energy, :math:`\bar C` the isochoric right Cauchy-Green tensor.
+    The tensor M_k describes the elastic strain of branch k with the shear modulus mu_k. It is the internal variable of
+    the branch or, in `Viscoelastic`, the inverse of this variable.
+
+    The constants are the constants of the equilibrium energy, then mu_1, tau_1, mu_2, and so on. `strain_energy`,
+    `shear_modulus`, and `stress` without times give the response before any relaxation.
 
     Args:
         equilibrium: material that describes the relaxed state; None if all stress relaxes.
@@ -230,13 +233,15 @@ class GeneralisedMaxwell(RelaxingMaterial):
                between: str = "stretch", *, true: bool = False) -> np.ndarray:
         r"""Return the nominal stress, force over reference area, in a homogeneous test.
 
-        With the stress P_eq of the equilibrium and the elastic logarithmic strains w of the branches
+        With the stretch l in the loaded direction, the stress P_eq of the equilibrium, the shear moduli mu_k and the
+        elastic logarithmic strains w_k of the branches along the load (1) and in the stress-free direction (3)
 
         .. math:: P(t) = P_{eq}(l) + \sum_k \mu_k \frac{e^{2 w_{k1}} - e^{2 w_{k3}}}{l}
 
         Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times also "biaxial", see `Material.stress`.
-            stretches: stretches in the loaded direction, any shape without times, shape (n,) with times.
+            mode: "uniaxial", "pure_shear" or "equibiaxial"; without times also "biaxial".
+            stretches: stretches l in the loaded direction, any shape without times, shape (n,) with times. For
+                "biaxial" any in-plane stretches (l1, l2), shape (2, ...).
             times: times of the stretches, shape (n,), not descending. The first stretch is applied suddenly to a body
                 in the reference configuration; two stretches at the same time are a jump. None: every stretch is
                 applied suddenly to a body in the reference configuration.
@@ -345,10 +350,15 @@ class GeneralisedMaxwell(RelaxingMaterial):
         return entries(internal["C"]) if self._stores_C else None
 
     def _deformation_history(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
-        """Return {name: value} of the internal variables, besides the tensors of the branches, for the next step.
+        """Return {name: value at the end of the step} of the internal variables that describe the past deformation.
 
-        `C` has the entries at the end of the present step, `internal` the variables at its beginning. The length of the
-        step is `time_step`.
+        The internal variables of the branches are not among them. By default the only one is C, the isochoric right
+        Cauchy-Green tensor.
+
+        Args:
+            C: this tensor at the end of the step, entries (11, 22, 12, 33).
+            internal: {name: internal variable at the beginning of the step}.
+            time_step: length of the step (UFL scalar, time).
         """
         return {"C": C} if self._stores_C else {}
 
@@ -363,26 +373,38 @@ class GeneralisedMaxwell(RelaxingMaterial):
         raise NotImplementedError
 
     def _stored(self, C: Entries, A: Entries) -> Any:
-        """Return the stored energy of a branch over mu/2, for the isochoric C and the internal variable A."""
+        """Return the stored energy of a branch, divided by half its shear modulus (UFL).
+
+        C is the isochoric right Cauchy-Green tensor and A the internal variable, both as entries (11, 22, 12, 33).
+        """
         raise NotImplementedError
 
     def _dissipated(self, C: Entries, A: Entries) -> Any:
-        """Return the dissipated power of a branch over mu/(2 tau), for the isochoric C and the internal variable A."""
+        """Return the dissipated power of a branch, divided by mu/(2 tau), its shear modulus mu and relaxation time tau.
+
+        C is the isochoric right Cauchy-Green tensor and A the internal variable, both as entries (11, 22, 12, 33).
+        """
         raise NotImplementedError
 
     def _step(self, C: Entries, past: Any, A: Entries, x: Any) -> Any:
-        """Return the potential of a branch in a step, over mu/2: its derivative by F gives the stress at the end.
+        """Return the potential of a branch in a step, divided by half its shear modulus (UFL).
 
-        C is the isochoric right Cauchy-Green tensor at the end of the step, A the internal variable at its beginning.
-        `past` is the earlier deformation (`_past`), and x the length of the step over the relaxation time.
+        The derivative of the potential by F is the nominal stress at the end of the step.
+
+        Args:
+            C: isochoric right Cauchy-Green tensor at the end of the step, entries (11, 22, 12, 33).
+            past: earlier deformation that the step needs, the result of `_past`.
+            A: internal variable at the beginning of the step, entries (11, 22, 12, 33).
+            x: length of the step over the relaxation time.
         """
         raise NotImplementedError
 
     def _advanced(self, C: Entries, past: Any, A: Entries, x: Any) -> Entries:
         """Return the internal variable of a branch at the end of a step, entries (11, 22, 12, 33).
 
-        C is the isochoric right Cauchy-Green tensor at the end of the step, A the internal variable at its beginning.
-        `past` is the earlier deformation (`_past`), and x the length of the step over the relaxation time.
+        The arguments are C at the end of the step, the result `past` of `_past`, and A at the beginning. C is the
+        isochoric right Cauchy-Green tensor and A the internal variable, both as entries (11, 22, 12, 33). The length of
+        the step over the relaxation time is x.
         """
         raise NotImplementedError
 

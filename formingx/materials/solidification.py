@@ -107,7 +107,7 @@ class Solidification(Material):
 
     @property
     def flow_constants(self) -> tuple[str, ...]:
-        """Names of the constants of which a step uses the values in its middle.
+        """Names of the constants whose values in the middle of a step in time enter the step, not those at its end.
 
         They are the flow constants of the base material, and the constant from which the solidified fraction follows.
         """
@@ -229,7 +229,13 @@ class Solidification(Material):
 
 
 class _Fraction:
-    """Solidified fraction phi(T): linear from 1 at `low` to 0 at `high`, or a table, constant beyond these ends."""
+    """Solidified fraction phi as a function of the temperature, constant below `low` and above `high`.
+
+    Args:
+        low: highest temperature at which phi is 1.
+        high: lowest temperature at which phi is 0.
+        table: phi over the temperature, from `low` to `high`; None: phi is linear.
+    """
 
     def __init__(self, low: float, high: float, table: Table | None = None):
         self._low, self._high, self._table = low, high, table

@@ -48,8 +48,8 @@ class Viscoelastic(GeneralisedMaxwell):
         equilibrium: material that describes the relaxed state; None if all stress relaxes.
         branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
         order: order of a step in time, 2 or 1.
-        shift: law aT(T) of the temperature, a factor of the relaxation times, see `GeneralisedMaxwell`; None: no
-            dependence.
+        shift: `WLF`, `Arrhenius`, or any function aT(T) of an array of temperatures, by which each tau is multiplied.
+            None: the relaxation times do not depend on the temperature.
 
     >>> melt = fx.Viscoelastic(fx.NeoHookean(c10=0.1), branches=[(0.6, 0.1), (0.3, 2.0)])
     >>> round(melt.shear_modulus, 12)
@@ -85,14 +85,21 @@ class Viscoelastic(GeneralisedMaxwell):
         return tuple(scale * g for g in grown)
 
     def _step_start(self, past, Cv, x):
-        r"""Return the tensor G, entries (11, 22, 12, 33), and the number x' with which `Viscoelastic` states a step.
+        r"""Return the tensor G, entries (11, 22, 12, 33), and the factor x' of the closed form of a step.
+
+        At the end of the step the internal variable is G + x' C, scaled to the determinant 1. C is the isochoric right
+        Cauchy-Green tensor there.
 
         .. math:: G = C_{v,n} + \frac{x}{2} C_n, \qquad
                   x' = \frac{x}{2} \left[1 + \frac{x}{3} \mathrm{tr}(C_n C_{v,n}^{-1})\right]
 
-        Here x is the length of the step over the relaxation time. Cv_n is the internal variable at the beginning of the
-        step. `past` is C_n, the isochoric right Cauchy-Green tensor there. For a step of first order `past` is None:
-        then G = Cv_n and x' = x.
+        A step of first order has G = Cv_n and x' = x.
+
+        Args:
+            past: isochoric right Cauchy-Green tensor C_n at the beginning of the step, entries (11, 22, 12, 33); None
+                for a step of first order.
+            Cv: internal variable Cv_n at the beginning of the step, entries (11, 22, 12, 33).
+            x: length of the step over the relaxation time.
         """
         if past is None:
             return Cv, x
@@ -130,8 +137,8 @@ class TransientNetwork(GeneralisedMaxwell):
     Args:
         equilibrium: material that describes the relaxed state; None if all stress relaxes.
         branches: list of (mu, tau), at least one: shear modulus, stress, and relaxation time, time; each positive.
-        shift: law aT(T) of the temperature, a factor of the relaxation times, see `GeneralisedMaxwell`; None: no
-            dependence.
+        shift: `WLF`, `Arrhenius`, or any function aT(T) of an array of temperatures, by which each tau is multiplied.
+            None: the relaxation times do not depend on the temperature.
 
     >>> fx.TransientNetwork(None, branches=[(0.05, 1.0)]).shear_modulus
     0.05
@@ -145,14 +152,14 @@ class TransientNetwork(GeneralisedMaxwell):
         return super().internal | {"change": (0.0,) * 4, "pace": 0.0}
 
     def _past(self, internal, time_step):
-        r"""Return the earlier deformation that a step of `TransientNetwork` needs: two tensors (entries) and a number.
+        r"""Return the earlier deformation that a step needs: two tensors, entries (11, 22, 12, 33), and a factor.
 
         .. math:: C_n^{-1}, \qquad s \, (C_n^{-1} - C_{n-1}^{-1}), \qquad \frac{s}{1 + s}
 
         C_n and C_n-1 are the isochoric right Cauchy-Green tensors at the beginning of the step and of the previous
-        step. The ratio of the lengths of both steps is s; it is 0 if the previous step is unknown. The number is
-        multiplied by 2 - s/2 for s from 2 to 4, and is 0 for larger s, because BDF2 would be unstable. It is also 0
-        where the tensor M of the step would not be positive definite.
+        step. The length of the step over the length of the previous one is s; it is 0 if the previous step is unknown.
+        The factor s/(1 + s) is multiplied by 2 - s/2 for s from 2 to 4, and is 0 for larger s, because BDF2 would be
+        unstable. It is also 0 where the tensor M of the step (`_past_tensor`) would not be positive definite.
 
         Args:
             internal: {name: internal variable at the beginning of the step (UFL, shape () or (4,))}.
@@ -185,13 +192,19 @@ class TransientNetwork(GeneralisedMaxwell):
         return plus(self._past_tensor(past, A, x), cofactor(C), 1 - _mean_decay(x) - past[2] * _parabola_weight(x))
 
     def _past_tensor(self, past, A, x):
-        r"""Return the tensor M with which `TransientNetwork` states a step, entries (11, 22, 12, 33).
+        r"""Return the tensor M in the potential mu/2 [tr(C M) - 3] of a branch in a step, entries (11, 22, 12, 33).
+
+        Here mu is the shear modulus of the branch, and C the isochoric right Cauchy-Green tensor at the end of the
+        step. Its value at the beginning is C_n, at the beginning of the previous step C_n-1:
 
         .. math:: M = e^{-x} A_n + (m - e^{-x} + p) C_n^{-1} + p s (C_n^{-1} - C_{n-1}^{-1}), \qquad
                   m = \frac{1 - e^{-x}}{x}, \qquad p = \frac{x - 2 + (x + 2) e^{-x}}{x^2} \, \frac{s}{1 + s}
 
-        A_n is the internal variable at the beginning of the step, and x the length of the step over the relaxation
-        time. `past` is the earlier deformation (`_past`): the terms with C, and s/(1 + s).
+        Args:
+            past: C_n^-1 and s (C_n^-1 - C_n-1^-1), entries (11, 22, 12, 33), and s/(1 + s), reduced where BDF2 would be
+                unstable. The length of the step over the length of the previous one is s.
+            A: internal variable A_n at the beginning of the step, entries (11, 22, 12, 33).
+            x: length of the step over the relaxation time.
         """
         before, change, share = past
         decay, p = ufl.exp(-x), share * _parabola_weight(x)
@@ -210,7 +223,7 @@ def _mean_decay(x: Any) -> Any:
 
 
 def _parabola_weight(x: Any) -> Any:
-    r"""Return the factor of the weight p of `TransientNetwork` that depends on x (UFL), by its series for x < 0.01.
+    r"""Return the following factor of the weight p in a step of `TransientNetwork` (UFL), by its series for x < 0.01.
 
     .. math:: \frac{x - 2 + (x + 2) e^{-x}}{x^2}
 

@@ -60,7 +60,7 @@ class _Reaction(_Recorded):
 
 
 class _Ratio(_Recorded):
-    """Ratio of the stress at the pole to its equilibrium value, see `PoleStressRatio`."""
+    """Ratio of the Mises stress at the pole to its value after complete relaxation at the same deformation."""
 
     def __init__(self, problem):
         self._problem, self._ratio = problem, PoleStressRatio(problem)

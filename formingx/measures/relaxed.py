@@ -75,7 +75,7 @@ class PoleStressRatio:
     def _integrals(self) -> np.ndarray:
         """Return the integrals of three stresses over the elements at the pole.
 
-        These are the present equivalent stress, the equivalent stress after relaxation, and the largest shear modulus
+        These are the present Mises stress, the Mises stress after complete relaxation, and the largest shear modulus
         of the materials. The result has the shape (3,) and is equal on all ranks; collective.
         """
         totals = np.zeros(3)
@@ -86,10 +86,10 @@ class PoleStressRatio:
         return self._problem.comm.allreduce(totals, MPI.SUM)
 
     def _expression(self, terms: Any) -> fem.Expression:
-        """Return the three stresses of `_integrals` at quadrature points, each times the volume per reference volume.
+        """Return the integrands of `_integrals` at quadrature points, as a compiled expression of shape (3,).
 
-        They are the present and the relaxed Mises stress, and the largest shear modulus. The volume is the reference
-        volume of the body, over the volume of the reference cell of the element. `terms` are the `MaterialTerms` of a
+        They are the present Mises stress, the relaxed Mises stress and the largest shear modulus. Each is multiplied by
+        the reference volume of the body per volume of the reference cell. `terms` are the `MaterialTerms` of a
         material.
         """
         forms, e = self._problem.forms, self._strain
@@ -105,8 +105,8 @@ class PoleStressRatio:
 class ElasticStretches:
     """Largest principal elastic stretch of each relaxing branch, at n points of every cell.
 
-    The values at quadrature points are projected to a linear function in each cell, by least squares. See
-    `Material.elastic_stretches`.
+    It is 1 for a relaxed branch. The values at quadrature points are projected to a linear function in each cell, by
+    least squares.
 
     Args:
         problem: the `Problem`.

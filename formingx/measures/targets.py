@@ -33,7 +33,7 @@ class Amplitude(Quantity):
 
     @property
     def is_load(self) -> bool:
-        """True if the quantity belongs to a load, such as a pressure, and not to a support or a tool."""
+        """True if this is the value of a load, such as a pressure; False for a travel, the time or the control."""
         return self._acts
 
     @property
@@ -42,7 +42,10 @@ class Amplitude(Quantity):
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
     def _amplitude(self, control: float) -> float:
-        """Return the quantity divided by its scale, which is 1 for time and control, at a value of the control."""
+        """Return this pressure, travel or time over its scale, at a value of the control.
+
+        The scale of the process time and of the control is 1.
+        """
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -51,19 +54,21 @@ class Amplitude(Quantity):
         return (setting.acting_amplitude if self._acts else setting.amplitude)(self._number, control)
 
     def value(self, x, control):
-        """Return the quantity at a value of the control.
+        """Return this pressure, travel, time or control at a value of the control.
 
         Args:
             x: not used.
             control: load parameter (control), dimensionless.
 
         Returns:
-            The quantity, in the user's units.
+            The pressure, travel, time or control, in the user's units.
         """
         return self._scale * self._amplitude(control)
 
     def equation(self, target):
-        """Return the equation that the quantity equals a target value; it is linear in the control.
+        """Return the equation that this pressure, travel, time or control equals a target value.
+
+        The equation is linear in the control.
 
         Args:
             target: the target value, in the user's units.
@@ -334,11 +339,12 @@ def bind_pole_stretch(problem: Any) -> Quantity:
 def bind_volume(problem: Any, form: Any = None) -> Quantity:
     """Return the volume swept by the face under the controlled pressure as an output quantity.
 
-    `enclosed_volume` defines the volume. It belongs to the whole part, also where a half or a quarter is modelled.
+    The volume lies between the reference and the deformed face. It belongs to the whole part, also where a half or a
+    quarter is modelled.
 
     Args:
         problem: the `Problem`.
-        form: the result of `swept_volume`, if the caller has it; None to build it.
+        form: UFL form of the volume swept in the model (`swept_volume`), if the caller has it; None to build it.
 
     Returns:
         The quantity, length^3; in plane strain per unit depth, length^2.

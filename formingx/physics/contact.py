@@ -78,11 +78,11 @@ class Contact(Part):
             sheet, or a plug to which the sheet is bonded. The default is True. In three dimensions the default for
             "stick" is False: a point stays in contact until a stage of a process makes the tool inactive. With True,
             points under tension separate there, for materials that do not relax.
-        nodes_per_step: largest number of nodes that come into contact in one step, because the results of stick,
-            friction and heat exchange depend on the time of contact. An element edge has two nodes. None in a section:
-            one node. If any face sticks, it is up to 5 % of the nodes of each face with stick or friction, in the
-            predicted order of their gap closures. In three dimensions the number is a percentage of the nodes of the
-            face, and None is 1 %. Without stick, friction and heat exchange all numbers are ten times larger.
+        nodes_per_step: largest number of nodes that come into contact in one step; an element edge has two nodes. The
+            results of stick, friction and heat exchange depend on the time of contact. In a section None means 1. If
+            any face sticks, None means 5 % of the nodes of each face with stick or friction, in the predicted order of
+            their gap closures. In three dimensions the argument is a percentage of the nodes of the face, and None
+            means 1 %. Without stick, friction, bond and heat exchange ten times more nodes may come into contact.
         present_area: True: the penalty refers to area and wall thickness at the beginning of a step, instead of the
             reference configuration. A sheet that is drawn 20 times thinner then penetrates as little as an undeformed
             one. Only without friction. The penetration then depends on the steps.
@@ -170,7 +170,9 @@ class Contact(Part):
 
     @property
     def lagged(self) -> bool:
-        """True for tools in three dimensions: a point whose gap closes in a step is in contact from the next step on.
+        """True for tools in three dimensions, whose contact is lagged.
+
+        A point whose gap closes in a step is then in contact from the next step on, not yet in this step.
         """
         return self.tool.components == 3
 

@@ -31,7 +31,7 @@ class ContactStatus(IntEnum):
 
 
 class ContactHistory(NamedTuple):
-    """History variables of n contact points at the last accepted state, relative to the tool.
+    """History variables of n contact points with c coordinates at the last accepted state, relative to the tool.
 
     Attributes:
         position: positions, shape (n, c), length.
@@ -48,7 +48,7 @@ class ContactHistory(NamedTuple):
 
 
 class Tractions:
-    """Contact tractions that the body exerts on the tool at n points, per unit reference area.
+    """Contact tractions with c components that the body exerts on the tool at n points, per unit reference area.
 
     Args:
         force: traction vectors, shape (n, c), stress. They enter the residual (internal minus external forces) with
@@ -67,8 +67,7 @@ class Tractions:
 
     @cached_property
     def stiffness(self) -> np.ndarray:
-        """Derivative of the traction vectors with respect to the positions of their points, shape (n, c, c),
-        stress/length."""
+        """Derivative of the traction vectors by the positions of their points, shape (n, c, c), stress/length."""
         return self._stiffness()
 
     @cached_property
@@ -83,7 +82,7 @@ class Tractions:
 
 
 class Motion(NamedTuple):
-    """Distance and elastic slip of n points at a tool, with their gradients, for a first-order prediction.
+    """Distance and elastic slip of n points with c coordinates, with their gradients, for a first-order prediction.
 
     Attributes:
         position: positions relative to the tool at which the other values hold, shape (n, c), length.
@@ -159,7 +158,7 @@ class ContactLaw:
 
     @property
     def profile(self) -> Tool | None:
-        """Tool of lines and arcs whose signed distance, less `shift`, is `distance`; None for other distances."""
+        """Tool of lines and arcs, if `distance` returns its signed distance less the length `shift`; else None."""
         return None
 
     @property
@@ -193,14 +192,14 @@ class ContactLaw:
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and elastic slips of the points with their gradients.
 
-        `tractions` linearises the law there. By default all are 0, for a law that is linear in x.
+        The method `tractions` linearises the law at these values. By default all are 0, for a law that is linear in x.
 
         Args:
             x: positions relative to the tool, shape (n, c), length.
             old: history variables of the last accepted state; None: there are none.
 
         Returns:
-            Distances, slips and gradients at x.
+            Distances, positive inside the tool, and slips, shape (n,), length; their gradients, shape (n, c).
         """
         return Motion(x, np.zeros(len(x)), np.zeros_like(x), np.zeros(len(x)), np.zeros_like(x))
 
@@ -211,7 +210,7 @@ class ContactLaw:
         Args:
             x: positions relative to the tool, shape (n, c), length.
             old: history variables of the last accepted state; None: there are none.
-            sense: sense of sliding in the previous Newton iteration, shape (n,); None in the first.
+            sense: sense of sliding in the last Newton iteration, 1 or -1, 0 for stick, shape (n,); None in the first.
             expected: distances and slips at which the law is linearised; None: those at x.
 
         Returns:
@@ -262,14 +261,14 @@ class ContactLaw:
         raise NotImplementedError
 
     def nearest(self, x: np.ndarray) -> Nearest:
-        """Return the geometry of the tool at the points nearest to the contact points (`PlaneTool.nearest`).
+        """Return the geometry of the tool at its points nearest to the contact points.
 
         Args:
             x: positions relative to the tool, shape (n, c), length.
 
         Returns:
-            Signed distances less `shift`, positive inside the tool, shape (n,), length; unit normals (gradients of the
-            distance), shape (n, c); curvatures, shape (n,), 1/length.
+            Signed distances less the length `shift` of the law, positive inside the tool, shape (n,), length; unit
+            normals (gradients of the distance), shape (n, c); curvatures, shape (n,), 1/length.
         """
         raise NotImplementedError
 
@@ -306,7 +305,7 @@ class ContactLaw:
         raise NotImplementedError
 
     def without(self, points: np.ndarray) -> ContactLaw:
-        """Return a copy of the law with zero traction at some points in any position; mask of points, shape (n,)."""
+        """Return a copy of the law without traction at the points of a mask, shape (n,), wherever these points are."""
         raise NotImplementedError
 
     def with_friction(self, mu: np.ndarray | float) -> Self:
@@ -343,7 +342,7 @@ class NormalLaw(ContactLaw):
 
         .. math:: \int_{-\theta}^{d} F(s) \, ds
 
-        F is the result of `ramp`. Contact begins at the distance -theta.
+        F(d) is the result of `ramp` at the distance d. Contact begins at the distance -theta.
 
         Args:
             d: signed distances from the tool, positive inside, shape (n,), length.
@@ -375,7 +374,8 @@ class NormalLaw(ContactLaw):
             x: positions relative to the tool, shape (n, 2), length.
 
         Returns:
-            Signed distances less `shift`, positive inside the tool, with unit normals and curvatures of the tool.
+            Signed distances less the length `shift` of the law, positive inside the tool, shape (n,), length; unit
+            normals (gradients of the distance), shape (n, 2); curvatures, shape (n,), 1/length.
         """
         positions = x.tobytes()
         for known, near in self._near:

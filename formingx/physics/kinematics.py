@@ -47,15 +47,15 @@ class Kinematics:
     scene_checks: Any = None
 
     def in_axes(self, support: Any, items: list[Any]) -> list[Any]:
-        """Return the constraints of a support, with component numbers that index `axes`.
+        """Return the constraints of a support, with components numbered by their positions in the attribute `axes`.
 
         Args:
             support: the `Support`, for the message.
-            items: constraints of the support (`Constrained` or `ConstrainedMean`). Their component numbers index
-                `formingx.physics.supports.NAMES`.
+            items: constraints of the support (`Constrained` or `ConstrainedMean`), with components numbered 0 for r, 1
+                for z, 2 for y, 3 for x.
 
         Returns:
-            The constraints with component numbers that index `axes`.
+            The constraints with the new numbers.
 
         Raises:
             InputError: the body does not have a constrained component.
@@ -67,7 +67,7 @@ class Kinematics:
         return items
 
     def deformation_gradient(self, u: Any, X: Any) -> Any:
-        """Return the deformation gradient F; the classes `Axisymmetric` and `PlaneStrain` state it.
+        """Return the deformation gradient F of a displacement; each subclass defines it.
 
         Args:
             u: displacement (UFL, shape (2,), length).
@@ -97,9 +97,9 @@ class Kinematics:
         .. math:: a = w(X) \, J F^{-T} N = \begin{cases} 2 \pi (R + u_r) \, \mathrm{cof}(I + \nabla u) N &
                   \text{axisymmetric} \\ \mathrm{cof}(I + \nabla u) N & \text{else} \end{cases}
 
-        F is the deformation gradient, J its determinant, and w the weight of `weight`. For quadratic displacements of
-        an axisymmetric body a is a polynomial of degree 3, without division by R. In three dimensions it is the area
-        vector per unit reference area of the sheet.
+        F is the deformation gradient and J its determinant; w is 2 pi R or 1 (`weight`). For quadratic displacements
+        of an axisymmetric body a is a polynomial of degree 3, without division by R. In three dimensions it is the
+        area vector per unit reference area of the sheet.
 
         Args:
             u: displacement (UFL, shape (2,) or (3,), length).
@@ -143,7 +143,7 @@ class Kinematics:
         raise NotImplementedError
 
     def rigid_modes(self, number: float) -> list[Callable[[np.ndarray], np.ndarray]]:
-        """Return the rigid-body motions of the deformed body that have the form of modes, see `mode_gradient`.
+        """Return the rigid-body motions of the deformed body that are modes with a given wave number.
 
         In plane strain these are the motions in the section and the translation along the depth, for the wave number 0.
 
@@ -151,8 +151,8 @@ class Kinematics:
             number: circumferential wave number; in plane strain the wave number along the depth, 1/length.
 
         Returns:
-            Functions from deformed positions, shape (m, 2), to amplitudes (U, W, V) of `mode_gradient`, shape (m, 3);
-            empty if no rigid motion has this wave number.
+            Functions from deformed positions, shape (m, 2), to the amplitudes (U, W, V) of the displacement along r, z
+            and the hoop or depth direction, shape (m, 3); empty if no rigid motion has this wave number.
         """
         raise NotImplementedError
 
@@ -258,11 +258,11 @@ class ThreeD(Kinematics):
 
         Args:
             support: the `Support`.
-            items: constraints of the support (`Constrained`). Their component numbers index
-                `formingx.physics.supports.NAMES`.
+            items: constraints of the support (`Constrained`), with components numbered 0 for r, 1 for z, 2 for y, 3 for
+                x; r also means x.
 
         Returns:
-            The constraints with component numbers that index `axes`.
+            The constraints with components numbered 0 for x, 1 for y, 2 for z.
         """
         if {item.component for item in items} == {0, 1}:
             items = [*items, items[0]._replace(component=NAMES.index("y"))]
@@ -436,7 +436,7 @@ def cofactor_change(F, H):
 
 
 def _rows(gradient, last):
-    """Return the tensor (UFL, shape (3, 3)) with the columns `gradient`, shape (3, 2), and `last`, shape (3,)."""
+    """Return the tensor (UFL, shape (3, 3)) with the columns 1 and 2 in `gradient`, shape (3, 2), and 3 in `last`."""
     return ufl.as_tensor([[gradient[i, 0], gradient[i, 1], last[i]] for i in range(3)])
 
 

@@ -50,9 +50,9 @@ class Load(Part):
         """Return the first-order change of the virtual work by a non-axisymmetric mode, for the stability analysis.
 
         Args:
-            body: object with the members of `virtual_work` and three more. `mode` has the amplitudes (u_r, u_z,
-                u_hoop) of a mode, and `dmode` the amplitudes of its variation (UFL, shape (3,), length). `H` is the
-                change of F by the mode (UFL, shape (3, 3)).
+            body: a `formingx.forms.loaded_body.LoadedBody` with three more members. `mode` has the displacement
+                amplitudes (u_r, u_z, u_hoop) of a mode, and `dmode` those of its variation (UFL, shape (3,), length).
+                `H` is the change of the deformation gradient by the mode (UFL, shape (3, 3)).
             value: value of the load (UFL scalar, user's units).
 
         Returns:
@@ -119,11 +119,13 @@ class Pressure(Load):
 
         .. math:: -p \int_{\Gamma} \left(\delta \, \mathrm{cof} F[H] \, N\right) \cdot \delta v \, dA
 
-        H is the change of F by the mode, and N the reference normal. `formingx.physics.kinematics.cofactor_change`
-        gives the change of the cofactor.
+        H is the change of the deformation gradient F by the mode, and N the reference normal.
+        `formingx.physics.kinematics.cofactor_change` gives the change of the cofactor.
 
         Args:
-            body: object with the members of `Load.mode_work`, among them `mode`, `dmode` and `H`.
+            body: a `formingx.forms.loaded_body.LoadedBody` with the displacement amplitudes (u_r, u_z, u_hoop): `mode`
+                of the mode, `dmode` of its variation (UFL, shape (3,), length). It also has H as `H` (UFL, shape
+                (3, 3)).
             value: pressure p (UFL scalar, stress).
 
         Returns:
@@ -184,7 +186,8 @@ class CentrifugalLoad(Load):
     .. math:: \delta W = \int_{V} \rho \, \omega^2 (R + u_r) \, \delta u_r \, dV
 
     Args:
-        density: density rho in the reference configuration, see `Gravity`.
+        density: density rho in the reference configuration, positive; {layer: density} if only some layers have mass.
+            Its unit is kg/m3 with Pa, m and s, and t/mm3 with MPa, mm and s.
         value: omega^2, the square of the angular speed, 1/time^2; None: omega^2 is a load parameter (control) of the
             run.
         name: name of the load in the stages of a `Process` and in the column names of results.
@@ -205,10 +208,14 @@ class CentrifugalLoad(Load):
     def mode_work(self, body, value):
         r"""Return the change of the virtual work of the centrifugal force by a mode of amplitudes (U, W, V).
 
-        .. math:: \int_{V} \rho \, \omega^2 (U \, \delta U + V \, \delta V) \, dV
+        .. math:: \int_{\Omega} \rho \, \omega^2 (U \, \delta U + V \, \delta V) \, d\Omega
+
+        U, W and V are the amplitudes along r, z and the hoop direction. Omega is the reference volume, rho the density
+        and omega the angular speed.
 
         Args:
-            body: object with the members of `Load.mode_work`, among them `mode`, `dmode` and `H`.
+            body: a `formingx.forms.loaded_body.LoadedBody` with the displacement amplitudes (u_r, u_z, u_hoop): `mode`
+                of the mode, `dmode` of its variation (UFL, shape (3,), length).
             value: omega^2 (UFL scalar, 1/time^2).
 
         Returns:
@@ -224,5 +231,8 @@ def _density(caller: str, given: Any) -> dict[str | None, float]:
 
 
 def _weighed(body: Any, density: dict[str | None, float], integrand: Any) -> Any:
-    """Return the integral of density times an integrand over the reference volume (UFL); density: {layer: value}."""
+    """Return the integral of the density times an integrand (UFL scalar) over the reference volume, a UFL form.
+
+    `body` is the `LoadedBody`. `density` is {layer: density}, in which the layer None stands for all layers.
+    """
     return sum(body.integral(body.constant(rho) * integrand, layer) for layer, rho in density.items())

@@ -27,8 +27,8 @@ class Law(NormalLaw):
               T_{Coulomb} = \mu N \min(|g| / g_s, 1)\, \operatorname{sign} g
 
     N and T are the normal and tangential traction, d is the signed distance (positive inside the tool), and g the
-    elastic slip. `ramp` states F. N is that of Song (1993), eqs. (5.7) and (5.13); T tends to mu N, eq. (5.9), for a
-    small g_s.
+    elastic slip. The ramp F is (d + theta)^2/(4 theta) if abs(d) < theta, else max(d, 0). N is given by Song (1993),
+    eqs. (5.7) and (5.13); T tends to mu N, eq. (5.9), for a small g_s.
 
     Args:
         tool: the tool, which gives the signed distance.
@@ -38,8 +38,8 @@ class Law(NormalLaw):
         elastic_slip: elastic slip g_s at which a point begins to slide, length; not used by stick.
         shift: length by which the signed distances are reduced, shape () or (n,).
         adhesive: True if points in contact never separate and can carry tension.
-        shear_limit: function of pressure and mu that returns the shear stress at which points slide and its derivative,
-            see `Contact.shear_limit`; None for Coulomb's mu p.
+        shear_limit: function of the pressure p, shape (n,), and mu, shape () or (n,). It returns the shear stress at
+            which points slide, and its derivative by p. None for Coulomb's mu p.
     """
 
     predictable = True
@@ -218,8 +218,13 @@ class Law(NormalLaw):
         """Return the output of the C function `tractions` at n positions x, one array of shape (12 n,).
 
         In this order it has the traction vectors (2 n), normal tractions, tangential tractions and senses of sliding (n
-        each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each). Arguments are those
-        of the method `tractions`.
+        each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each).
+
+        Args:
+            x: positions relative to the tool, shape (n, 2), length.
+            old: history variables of the last accepted state, or None.
+            sense: sense of sliding in the previous Newton iteration, 1 or -1, 0 for a sticking point, shape (n,).
+            expected: distances and slips at which the law is linearised; None: those at x.
         """
         near, out = self.nearest(x), np.empty(12 * len(x))
         before, g, dg, limit, grows = NULL, NULL, NULL, NULL, NULL
@@ -269,7 +274,8 @@ class Law(NormalLaw):
             old: history variables of the last accepted state, or None: slips are 0.
 
         Returns:
-            Distances, normals, slips and gradients of the slip at x.
+            Signed distances, positive inside the tool, shape (n,), length, and their gradients, shape (n, 2). Elastic
+            slips, shape (n,), length, and their gradients, shape (n, 2).
         """
         near = self.nearest(x)
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
@@ -308,7 +314,7 @@ class Law(NormalLaw):
 
         Args:
             x: positions relative to the tool, shape (n, 2), length.
-            near: geometry of the tool there, the result of `nearest`.
+            near: geometry of the tool at its points nearest to x, the result of `nearest`.
             old: history variables of the last accepted state.
         """
         if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
@@ -319,7 +325,10 @@ class Law(NormalLaw):
         return self._slid[2]
 
     def _addresses(self, old: ContactHistory) -> list:
-        """Return the addresses of the arrays of history variables, stored for repeated calls with the same ones."""
+        """Return the addresses of the four arrays of the history variables `old`.
+
+        The result is stored for repeated calls with the same object `old`.
+        """
         if self._past is None or self._past[0] is not old:
             self._past = old, [address(values) for values in old]
         return self._past[1]

@@ -16,7 +16,7 @@ class Constrained(NamedTuple):
     """Constraint of one displacement component to 0, at all nodes of a boundary or at one node.
 
     Attributes:
-        component: number of the component in `NAMES`: 0 for r, 1 for z, 2 for y, 3 for x. A body in three dimensions
+        component: number of the displacement component: 0 for r, 1 for z, 2 for y, 3 for x. A body in three dimensions
             has no r: there 0 also means x.
         on: name of the boundary, or None.
         point: reference position of the node, (r, z), length, or None.
@@ -37,7 +37,7 @@ class ConstrainedMean(NamedTuple):
     The weight w is 1 or the shear modulus of the layer. The multiplier is a traction in proportion to w.
 
     Attributes:
-        component: number i of the component in `NAMES`: 0 for r, 1 for z, 2 for y, 3 for x.
+        component: number i of the displacement component: 0 for r, 1 for z, 2 for y, 3 for x.
         on: name of the boundary.
         by_stiffness: True if w is the shear modulus of the layer, False if w = 1.
         point: None; `Constrained` has the same attribute.
@@ -240,7 +240,10 @@ class PrescribedDisplacement(_OneComponent):
 
 
 def _component(name: str, value: str) -> int:
-    """Return the number in `NAMES` of a component given by its name `value`; `name` begins the error message."""
+    """Return the number of a displacement component with the name `value`: 0 for "r", 1 for "z", 2 for "y", 3 for "x".
+
+    Another name raises an InputError, whose message begins with `name`.
+    """
     if not isinstance(value, str) or value not in NAMES:
         raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in three dimensions 'x', 'y' or 'z')")
     return NAMES.index(value)

@@ -19,11 +19,12 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
 
     Args:
         scene: the `Scene`.
-        plans: plans of the stages (`formingx.solve.stage.Plan`).
+        plans: the stages, each with the numbers of the items that move or are inactive in it
+            (`formingx.solve.stage.Plan`).
         travels: travels of the tools at the beginning, {number in `Scene.items`: length}; None: all are 0.
 
     Returns:
-        The plans with an unknown travel at their beginning, to be checked again when the run reaches them.
+        The plans of the stages at whose beginning a travel is unknown. They must be checked when the run reaches them.
 
     Raises:
         InputError: two tools overlap, or a constrained boundary would lie inside a tool.
@@ -55,8 +56,8 @@ def _break_points(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, fl
     travel that is known only in the run is nan.
 
     Args:
-        plan: the stage, as a `Plan` (`formingx.solve.stage`).
-        travels: travels at the beginning of the stage.
+        plan: the stage with the numbers of its items (`formingx.solve.stage.Plan`).
+        travels: travels at the beginning of the stage, {number in `Scene.items`: length}.
     """
     if plan.tables:
         for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):

@@ -48,11 +48,12 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 
 
 def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
-    """Return the values of a temperature at points that are equal on all ranks, shape (n,); collective.
+    """Return the values of a temperature at n points, shape (n,), equal on all ranks; collective.
 
     Args:
-        field: the temperature, in one of the forms of `values_at`.
-        points: reference positions, shape (n, 2), length.
+        field: the temperature: a number, a `Table` over the first coordinate, a function of arrays of both coordinates,
+            the name of a CSV file, the result of `fx.heat` or a scalar DOLFINx `Function`.
+        points: reference positions, the same on all ranks, shape (n, 2), length.
         name: name of the argument, for messages.
         axes: names of the coordinates, "RZ" or "xy".
     """
@@ -99,7 +100,7 @@ class PointReader:
                          else np.zeros((0, element.dim)))
 
     def read(self, array: np.ndarray) -> np.ndarray:
-        """Return the values of a function at the points, on all ranks; collective.
+        """Return the values of a scalar finite element function at the n points, on all ranks; collective.
 
         Args:
             array: coefficients of the function on this rank, with ghosts.
@@ -165,6 +166,12 @@ def _check_inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) 
 
 
 def _first_false(points: np.ndarray, mask: np.ndarray, axes: str) -> str:
-    """Return the first point of shape (n, 2) whose entry in the mask is False, as text; `axes` is "RZ" or "xy"."""
+    """Return the coordinates of the first point with False in the mask, as text.
+
+    Args:
+        points: points, shape (n, 2), length.
+        mask: mask of the points, shape (n,).
+        axes: names of the coordinates, "RZ" or "xy".
+    """
     first, second = points[np.argmin(mask)]
     return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"

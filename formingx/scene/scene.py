@@ -205,7 +205,7 @@ class Scene:
 
     @property
     def drivable(self) -> list[Any]:
-        """Items whose pressure, displacement or travel a run can control; of a tool with several faces the first."""
+        """Items whose pressure, displacement or travel a run can control; the first contact of each moving tool."""
         return [item for i, item in enumerate(self.items)
                 if item.driven and self.same_tool(i)[0] == i]
 
@@ -310,7 +310,7 @@ class Scene:
         support_checks.check_driven(supports)
 
     def _has_constants_of_mesh(self) -> bool:
-        """Return True if a constant of a material is a UFL expression of the mesh, which must then be kept."""
+        """Return True if a material constant is a UFL expression of the given mesh, so that the mesh must be kept."""
         return any(isinstance(constant, OfMesh) for material in self.materials.values()
                    if isinstance(material, Material) for constant in material.constants().values())
 
@@ -380,7 +380,8 @@ class Scene:
             layer: name of the layer.
 
         Returns:
-            The points, the cells that contain them, and the temperatures.
+            Positions of q points in each of m cells, shape (m q, 2), length. Local numbers of the cells, shape (m,),
+            positions in the reference cell, shape (q, 2), and temperatures, shape (m q,) or None.
         """
         check_name("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)

@@ -123,7 +123,10 @@ def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
 
 
 def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
-    """Return True if a pole of this height would lie deeper inside the tool of a contact than the body is thick."""
+    """Return True if the pole of the contact face would lie deeper inside the tool than the body is thick.
+
+    `height` is the axial displacement of the pole, length. The result is False for a face without a pole.
+    """
     nodes = scene.mesh.nodes_of(contact.on)
     pole = nodes[np.argmin(nodes[:, 0])]
     if contact.tool.components == 3 or pole[0] > 1e-9 * max(scene.extent):
@@ -138,8 +141,8 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
     For a flat body a square counts if its centre is outside the tool and in the cavity next to the body.
 
     Returns:
-        The volume, length^3, or length^2 in plane strain; infinite if the mould is open. Then the largest ratio of the
-        true volume to this volume.
+        The counted volume, length^3, or length^2 in plane strain; infinite if the mould is open. Then an upper bound of
+        the true volume, divided by the counted volume.
     """
     from scipy.ndimage import binary_dilation, label
     face = scene.mesh.nodes_of(contact.on)

@@ -34,7 +34,8 @@ class GivenTemperature:
     """Temperature of the body that a scene gives, interpolated to quadratic elements on the mesh.
 
     Args:
-        given: the temperature in one of the forms of `fields.values_at`, such as a number or a function of (R, Z).
+        given: the temperature: a number, a `Table` over R, a function of arrays (R, Z), the name of a CSV file, the
+            result of `fx.heat` or a scalar DOLFINx `Function`.
         mesh: mesh of the scene.
 
     Attributes:
