@@ -203,7 +203,7 @@ def membrane_sliding_over_plug(face_stretch: float, *, radius: float, plug_radiu
                                thickness: float, c10: float, mu: float) -> SlidingState:
     r"""Return the neo-Hookean membrane that slides over a flat plug with a rounded edge under Coulomb friction.
 
-    On the edge, with the meridional and circumferential tensions T_1 and T_2 per deformed length, and with the deformed
+    T_1 and T_2 are the meridional and circumferential tensions per deformed length. On the edge, with the deformed
     radius r, arc length s, slope phi and curvature kappa of the meridian:
 
     .. math:: \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r} + \mu N \frac{f}{f + h/2}, \qquad

@@ -57,8 +57,8 @@ class Response:
 
         Args:
             stretches: principal stretches (l1, l2), shape (2, n); l3 = 1/(l1 l2).
-            constants: values of the constants of the energy, in the order of the argument `names` of this class, each a
-                number or of shape (n,).
+            constants: values of the constants of the energy, in the order of the class argument `names`, each a number
+                or an array of shape (n,).
 
         Returns:
             Stresses P in directions 1 and 2, shape (2, n), stress.
@@ -75,8 +75,8 @@ class Response:
 
         Args:
             stretches: principal stretches (l1, l2, l3), shape (3, n).
-            constants: values of the constants of the energy, in the order of the argument `names` of this class, each a
-                number or of shape (n,).
+            constants: values of the constants of the energy, in the order of the class argument `names`, each a number
+                or an array of shape (n,).
 
         Returns:
             First derivatives, shape (3, n), and second derivatives, shape (3, 3, n), stress.
@@ -95,8 +95,8 @@ class Response:
 
         Args:
             stretches: principal stretches (l1, l2), shape (2, n); l3 = 1/(l1 l2).
-            constants: values of the constants of the energy, in the order of the argument `names` of this class, each a
-                number or of shape (n,).
+            constants: values of the constants of the energy, in the order of the class argument `names`, each a number
+                or an array of shape (n,).
 
         Returns:
             Gradient g, shape (2, n), and Hessian K, shape (2, 2, n), stress.

@@ -233,8 +233,8 @@ class GeneralisedMaxwell(RelaxingMaterial):
                between: str = "stretch", *, true: bool = False) -> np.ndarray:
         r"""Return the nominal stress, force over reference area, in a homogeneous test.
 
-        With the stretch l in the loaded direction, the stress P_eq of the equilibrium, the shear moduli mu_k and the
-        elastic logarithmic strains w_k of the branches along the load (1) and in the stress-free direction (3)
+        Branch k has the shear modulus mu_k, and the elastic logarithmic strains w_k1 along the load and w_k3 in the
+        stress-free direction. With the stretch l in the loaded direction and the stress P_eq of the equilibrium
 
         .. math:: P(t) = P_{eq}(l) + \sum_k \mu_k \frac{e^{2 w_{k1}} - e^{2 w_{k3}}}{l}
 

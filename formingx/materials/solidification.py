@@ -98,9 +98,9 @@ class Solidification(Material):
         """Internal variables, {name: value in the reference configuration}.
 
         They are the variables of the base material, the isochoric right Cauchy-Green tensors C of the last two states,
-        and A, the integral of C^-1 over the solidified fraction. The last one is the fraction phi that A includes. A
-        and phi include the material that solidifies in a step from the beginning of the next step, when the temperature
-        at the end of the step is known.
+        and A, the integral of C^-1 over the solidified fraction. The last one is the fraction phi that A includes. The
+        temperature at the end of a step is known when the next step begins. A and phi include the material that
+        solidified in a step only from then on.
         """
         return {**self._base.internal, _BEFORE: IDENTITY, _LAST: IDENTITY, _GLASS: (0.0, 0.0, 0.0, 0.0),
                 _FRACTION: 0.0}

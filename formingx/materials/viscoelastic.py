@@ -223,7 +223,7 @@ def _mean_decay(x: Any) -> Any:
 
 
 def _parabola_weight(x: Any) -> Any:
-    r"""Return the following factor of the weight p in a step of `TransientNetwork` (UFL), by its series for x < 0.01.
+    r"""Return a factor of the weight p in a step of `TransientNetwork` (UFL), by its series for x < 0.01.
 
     .. math:: \frac{x - 2 + (x + 2) e^{-x}}{x^2}
 

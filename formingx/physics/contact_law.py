@@ -267,8 +267,8 @@ class ContactLaw:
             x: positions relative to the tool, shape (n, c), length.
 
         Returns:
-            Signed distances less the length `shift` of the law, positive inside the tool, shape (n,), length; unit
-            normals (gradients of the distance), shape (n, c); curvatures, shape (n,), 1/length.
+            Signed distances less the length `shift` of the law, positive inside the tool, shape (n,), length. Unit
+            normals (gradients of the distance), shape (n, c), and curvatures, shape (n,), 1/length.
         """
         raise NotImplementedError
 
@@ -374,8 +374,8 @@ class NormalLaw(ContactLaw):
             x: positions relative to the tool, shape (n, 2), length.
 
         Returns:
-            Signed distances less the length `shift` of the law, positive inside the tool, shape (n,), length; unit
-            normals (gradients of the distance), shape (n, 2); curvatures, shape (n,), 1/length.
+            Signed distances less the length `shift` of the law, positive inside the tool, shape (n,), length. Unit
+            normals (gradients of the distance), shape (n, 2), and curvatures, shape (n,), 1/length.
         """
         positions = x.tobytes()
         for known, near in self._near:

@@ -151,8 +151,8 @@ class Kinematics:
             number: circumferential wave number; in plane strain the wave number along the depth, 1/length.
 
         Returns:
-            Functions from deformed positions, shape (m, 2), to the amplitudes (U, W, V) of the displacement along r, z
-            and the hoop or depth direction, shape (m, 3); empty if no rigid motion has this wave number.
+            Functions from deformed positions, shape (m, 2), to amplitudes along r, z and the hoop or depth direction,
+            shape (m, 3). The list is empty if no rigid motion has this wave number.
         """
         raise NotImplementedError
 

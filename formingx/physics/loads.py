@@ -51,7 +51,7 @@ class Load(Part):
 
         Args:
             body: a `formingx.forms.loaded_body.LoadedBody` with three more members. `mode` has the displacement
-                amplitudes (u_r, u_z, u_hoop) of a mode, and `dmode` those of its variation (UFL, shape (3,), length).
+                amplitudes (u_r, u_z, u_hoop) of the mode, `dmode` of its variation (UFL, shape (3,), length).
                 `H` is the change of the deformation gradient by the mode (UFL, shape (3, 3)).
             value: value of the load (UFL scalar, user's units).
 
@@ -124,8 +124,7 @@ class Pressure(Load):
 
         Args:
             body: a `formingx.forms.loaded_body.LoadedBody` with the displacement amplitudes (u_r, u_z, u_hoop): `mode`
-                of the mode, `dmode` of its variation (UFL, shape (3,), length). It also has H as `H` (UFL, shape
-                (3, 3)).
+                of the mode, `dmode` of its variation (UFL, shape (3,), length). Its `H` is H (UFL, shape (3, 3)).
             value: pressure p (UFL scalar, stress).
 
         Returns:

@@ -16,7 +16,7 @@ class Part:
         symmetric: True if the contribution of the item to the tangent is symmetric.
         direction: motion of a tool per unit of travel, (r, z) or (x, y, z); None except for moving tools.
         holds_rotation: True if a support also constrains the rotation of its boundary.
-        described: names of attributes whose values `repr` shows as text, such as the friction; a summary of the scene
+        described: names of attributes whose values `repr` shows as text, such as the friction. A summary of the scene
             does not show their numbers once more.
     """
 

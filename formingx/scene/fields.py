@@ -51,8 +51,8 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
     """Return the values of a temperature at n points, shape (n,), equal on all ranks; collective.
 
     Args:
-        field: the temperature: a number, a `Table` over the first coordinate, a function of arrays of both coordinates,
-            the name of a CSV file, the result of `fx.heat` or a scalar DOLFINx `Function`.
+        field: the temperature. It is a number, a `Table` over the first coordinate, a function of both coordinates, the
+            name of a CSV file, the result of `fx.heat`, or a DOLFINx `Function`.
         points: reference positions, the same on all ranks, shape (n, 2), length.
         name: name of the argument, for messages.
         axes: names of the coordinates, "RZ" or "xy".

@@ -205,7 +205,7 @@ class Scene:
 
     @property
     def drivable(self) -> list[Any]:
-        """Items whose pressure, displacement or travel a run can control; the first contact of each moving tool."""
+        """Items whose pressure, displacement or travel a run can control; of a moving tool only the first contact."""
         return [item for i, item in enumerate(self.items)
                 if item.driven and self.same_tool(i)[0] == i]
 

@@ -34,8 +34,8 @@ class GivenTemperature:
     """Temperature of the body that a scene gives, interpolated to quadratic elements on the mesh.
 
     Args:
-        given: the temperature: a number, a `Table` over R, a function of arrays (R, Z), the name of a CSV file, the
-            result of `fx.heat` or a scalar DOLFINx `Function`.
+        given: the temperature. It is a number, a `Table` over R, a function of arrays (R, Z), the name of a CSV file,
+            the result of `fx.heat`, or a DOLFINx `Function`.
         mesh: mesh of the scene.
 
     Attributes:
