@@ -45,10 +45,10 @@ class Body:
     r"""Viscoelastic body with one degree of freedom s, and its present state; initially s = 0 and the stress is 0.
 
     For a block and a thin balloon s is the logarithm of the stretch. For a thick wall s is a^n - A^n, with the deformed
-    and the reference inner radius a and A, and n = 2 for a tube, 3 for a sphere. The load is a sum over points. T is
-    the difference of the Cauchy stresses in the principal directions 1 (along a block, along a wall) and 3 (stress-free
-    in a block, through a wall). With the principal stretches lambda_1 and lambda_3 of the body and the elastic
-    logarithmic strains w_k of branch k:
+    and the reference inner radius a and A. There n is 2 for a tube, 3 for a sphere. The load is a sum over points. T is
+    the difference of the Cauchy stresses in the principal directions 1 and 3. Direction 1 is along a block or a wall,
+    3 is stress-free in a block and through a wall. With the principal stretches lambda_1 and lambda_3 of the body and
+    the elastic logarithmic strains w_k of branch k:
 
     .. math:: \text{load} = \sum_{i=1}^n c_i(s) \, T_i, \qquad
               T = 2 c_{10} (\lambda_1^2 - \lambda_3^2) + \sum_k \mu_k \left(e^{2 w_{k1}} - e^{2 w_{k3}}\right)
@@ -100,8 +100,8 @@ class Body:
         """Deform the body instantaneously, without relaxation.
 
         Args:
-            s: new value of the degree of freedom: the logarithm of the stretch of a block or a balloon, or a^n - A^n of
-                a wall (`Body`).
+            s: new value of the degree of freedom. It is the logarithm of the stretch of a block or a balloon, or
+                a^n - A^n for the inner radius of a wall (`Body`).
         """
         self.w = self._after_jump(s)
         self.s = s
