@@ -81,7 +81,7 @@ class PartNumbers(KeyNumbers):
 
     @property
     def weight_label(self) -> str:
-        """Label of the weight in the printed table; it says so if lengths have no unit and are taken for cm."""
+        """Label of the weight in the printed table: "weight", with a note if lengths have no unit and count as cm."""
         return "weight" + ", lengths taken for cm" * (not self.units.length)
 
     def _rows(self, where: str, further: list[tuple[str, str]]) -> list[tuple[str, str]]:
@@ -89,7 +89,7 @@ class PartNumbers(KeyNumbers):
 
         Args:
             where: place of the minimum wall, as text.
-            further: rows that only this kind of part has, before the last one.
+            further: rows that only this kind of part has; they precede the row of the scrap.
         """
         rows = [("given for", self.basis)] if self.basis else []
         if self.weight is not None:

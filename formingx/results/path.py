@@ -121,9 +121,10 @@ class Path(States):
     def to_vtk(self, file: Any, states: Any = None) -> None:
         """Write displacements, stresses and other fields of states for ParaView, one time step per state.
 
-        The module `formingx.results.files.fields` lists the fields. For the file run.pvd, state 3 of the path is
-        written to run-3.vtu; run.pvd lists the time steps. The time in ParaView is the number of the state. States of a
-        remeshed run have their own meshes.
+        The fields are displacement, stretches, stresses and their estimated error, elastic stretches of relaxing
+        branches, contact pressure and thickness, as far as the body has them. For the file run.pvd, state 3 of the path
+        is written to run-3.vtu; run.pvd lists the time steps. The time in ParaView is the number of the state. States
+        of a remeshed run have their own meshes.
 
         Args:
             file: its name ends in .pvd.
@@ -154,8 +155,8 @@ class Path(States):
             The file, which a notebook shows.
 
         Raises:
-            InputError: the name of the file has another ending, or ffmpeg is missing for an MP4. A number is not
-                allowed, the body is not a sheet, or the path has one state only.
+            InputError: the name of the file has another ending, or ffmpeg is missing for an MP4. `frames` or `seconds`
+                is not positive, the body is not a sheet in a section, or the path has one state only.
         """
         from .show import animation
         self.section_only("animate", "use report, or view3d for each state")
@@ -171,8 +172,9 @@ class Path(States):
             title: heading of the page.
             failure: the `ConvergenceError` that ended the run, or None.
             units: units of the script, for the labels; default none.
-            density: density of the material for the weight of the part, g/cm3 (`Path.part`).
-            trim: place at which the part is cut off (`Path.part`).
+            density: density of the material for the weight of the part, g/cm3.
+            trim: radius at which the part is cut off, or ("height", h), length; in three dimensions a z coordinate
+                beyond which the part lies.
 
         Returns:
             The path of the file.
@@ -386,8 +388,8 @@ class Path(States):
     def to_inp(self, file: Any, state: State | None = None, parts: int = 60) -> None:
         """Write the part as shell elements with the wall as thickness, for CalculiX or Abaqus (rank 0 writes).
 
-        The elements are S8R, at the axis S6, on the middle surface. The sets are ALL, WALL and RIM. The file contains
-        no material.
+        The elements are S8R, at the axis S6, on the middle surface. The element set is WALL, the node sets are ALL and
+        RIM, the outer end of the part. The file contains no material.
 
         Args:
             file: its name ends in .inp.

@@ -29,7 +29,16 @@ class Reader(Protocol):
         """Return the wall thickness of the part in a state as a table, one row per point or triangle."""
 
     def part(self, state: State, density: float | None, trim: object, heights: object, units: Units) -> KeyNumbers:
-        """Return the key numbers of the part in a state; for the arguments see `Path.part`."""
+        """Return the key numbers of the part in a state.
+
+        Args:
+            state: the state.
+            density: density of the material, g/cm3; None: no weight.
+            trim: radius at which the part is cut off, or ("height", h), length; in three dimensions a z coordinate
+                beyond which the part lies; None: not cut.
+            heights: axial distances from the pole at which the wall is listed, length; empty in three dimensions.
+            units: units of the script.
+        """
 
     def filling(self, contact: FaceContact) -> ColumnTable:
         """Return the remaining gaps between the body and the tool of a contact as a table, one row per state.
@@ -38,7 +47,13 @@ class Reader(Protocol):
         """
 
     def view(self, file: object, state: State, grid: float | None) -> None:
-        """Draw the body in a state as a PNG file; for the arguments see `Path.view3d`."""
+        """Draw the body in a state as a PNG file, coloured by its wall over the original thickness.
+
+        Args:
+            file: its name ends in .png.
+            state: the state.
+            grid: size of the squares of a grid that is printed on a flat sheet in three dimensions, length; None: none.
+        """
 
     def solid(self, state: State) -> tuple:
         """Return the part in a state as a closed surface of triangles.
@@ -50,7 +65,17 @@ class Reader(Protocol):
 
     def report(self, file: object, title: str, failure: object, units: Units, density: float | None,
                trim: object) -> FilePath:
-        """Write the report of the run, and return its path; for the arguments see `Path.report`."""
+        """Write the report of the run as an HTML file, and return the path of the file.
+
+        Args:
+            file: its name ends in .html.
+            title: heading of the page.
+            failure: the `ConvergenceError` that ended the run, or None.
+            units: units of the script, for the labels.
+            density: density of the material, g/cm3; None: no weight.
+            trim: radius at which the part is cut off, or ("height", h), length; in three dimensions a z coordinate
+                beyond which the part lies; None: not cut.
+        """
 
 
 class SectionReader:
@@ -69,7 +94,15 @@ class SectionReader:
         return self._walls.evaluate(state)
 
     def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> KeyNumbers:
-        """Return the `Part` in a state; for the arguments see `Path.part`."""
+        """Return the key numbers of the part in a state.
+
+        Args:
+            state: the state.
+            density: density of the material, g/cm3; None: no weight.
+            trim: radius at which the part is cut off, or ("height", h), length; None: not cut.
+            heights: axial distances from the pole at which the wall is listed, length.
+            units: units of the script.
+        """
         from .evaluate.part import part
         return part(self.wall(state), self._axisymmetric, density, trim, heights, units, self._path.scene.symmetry)
 
@@ -92,12 +125,25 @@ class SectionReader:
         draw(self._path.profile(state), file, self._path.problem.comm)
 
     def solid(self, state: State) -> tuple:
-        """Return the closed surface of the revolved or extruded section in a state, as `Reader.solid` describes it."""
+        """Return the closed surface of the revolved or extruded section in a state.
+
+        Returns:
+            Points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3); wall
+            over original thickness at the points, shape (n,).
+        """
         from .files.solid import coloured
         return coloured(self._path.profile(state), self._axisymmetric)
 
     def report(self, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-        """Write the report of the run; for the arguments see `Path.report`.
+        """Write the report of the run as an HTML file.
+
+        Args:
+            file: its name ends in .html.
+            title: heading of the page.
+            failure: the `ConvergenceError` that ended the run, or None.
+            units: units of the script, for the labels.
+            density: density of the material, g/cm3; None: no weight.
+            trim: radius at which the part is cut off, or ("height", h), length; None: not cut.
 
         Returns:
             The path of the file.

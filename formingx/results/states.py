@@ -164,7 +164,7 @@ class States:
         """Return an output quantity in a state, in the units of the script.
 
         Args:
-            measure: name of a column, or a quantity bound to the problem of the state (`Target.bind`).
+            measure: name of a column, or an output quantity of the problem of the state (from `Target.bind`).
             state: a state of this path, or one that `Path.state_at` solved for.
 
         Raises:
@@ -208,8 +208,8 @@ class States:
     def state_at(self, target: Target, after: State | None = None) -> State:
         """Return the first state of the path that meets a target.
 
-        It is solved for between two states of the path, not interpolated, and is not added to the path. A target may
-        lie beyond the last state by 5e-6 of its value, such as a rounded value.
+        It is solved for between two states of the path, not interpolated, and is not added to the path. The target may
+        be a rounded value, which lies beyond the last state by less than 5e-6 of its value.
 
         Args:
             target: the target, for example `pressure(0.4)`.
@@ -266,7 +266,7 @@ class States:
             left: the first of the two states.
             right: the second of the two states.
             target: the target.
-            bound: the quantity of the target, bound to the problem of the segment.
+            bound: the output quantity of the target, for the problem of the segment.
 
         Raises:
             InputError: the stage controls an output quantity, so it cannot be restarted between states.
@@ -285,7 +285,8 @@ class States:
         """Return the state between two successive states that meets a target, by a run from the first of them, `left`.
 
         The steps of this run update the history variables. `right` is the second state, `segment` contains both, and
-        `bound` is the quantity of the target, bound to the problem of the segment. Errors are those of `_between`.
+        `bound` is the output quantity of the target. An InputError is raised if the stage controls an output quantity,
+        a ConvergenceError if no state is found.
         """
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that controls an output"
@@ -361,7 +362,7 @@ class States:
     def _smooth(self, segment: Segment, states: list[State], columns: Any, points: int) -> list[list[float]]:
         """Return the values of columns on a smooth curve through successive states of one stage (`curve`).
 
-        There is one row per point, with one value per column; the first state has none. `columns` are their names,
+        A row has the values of the columns at a point; the first state gets no row. `columns` are names of columns,
         `points` is the number of points from one state to the next, and `segment` contains the states.
         """
         from scipy.interpolate import PchipInterpolator
@@ -437,7 +438,7 @@ class States:
         return self._view(self.segments[-1]).admissibility
 
     def _view(self, segment: Segment) -> _View:
-        """Return the objects that evaluate the states of a segment."""
+        """Return the objects that evaluate columns, profiles, stresses and admissibility of the states of a segment."""
         key = id(segment.problem)
         if key not in self._views:
             self._views[key] = _View(segment.problem, self._timed, self._columns)

@@ -349,7 +349,8 @@ def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> li
 
     Args:
         problem: the `Problem` on the mesh of the state.
-        variables: data of each set of history variables.
+        variables: for each set of history variables (of a material, a contact or the temperature) the dictionary of
+            its arrays.
 
     Raises:
         InputError: the scene has another number of sets of history variables.

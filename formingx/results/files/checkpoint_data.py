@@ -48,8 +48,8 @@ def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
         count: number of states to read.
 
     Returns:
-        Number of states in the checkpoint; the data of the last `count` of them (`read_data`); time since the last one
-        was written, s.
+        Number of states in the checkpoint; for each of the last `count` states its attributes as {name: value}; time
+        since the last one was written, s.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -94,7 +94,8 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         folder: folder of the checkpoint.
 
     Returns:
-        The data of scene.json with the result of `ended` as entry "ended", and the data of each state (`read_data`).
+        First the data of scene.json, such as the description of the scene and versions of programs; the entry "ended"
+        has the error message and the findings of the run, or None. Then for each state its attributes as {name: value}.
 
     Raises:
         InputError: there is no checkpoint, it holds no state, or it is damaged.
@@ -115,6 +116,9 @@ def read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
         folder: folder of the checkpoint.
         count: number of states.
         comm: MPI communicator; on its rank 0 a progress bar is shown.
+
+    Returns:
+        For each state its attributes as {name: value}.
     """
     found = []
     with progress(comm, f"{folder}: {count} states") as done:
@@ -180,7 +184,10 @@ def complete_states(folder: FilePath) -> list[FilePath]:
 
 
 def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
-    """Return the data of a state of a checkpoint with its arrays, as a dictionary.
+    """Return the data of a state of a checkpoint as {name: value}, with its arrays.
+
+    They are the attributes of the `State`, the history variables as "memory", the "profile" of a sheet, the "number" of
+    the state, and its "checksums".
 
     Args:
         folder: folder of the checkpoint.

@@ -94,14 +94,14 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
-    """Return weighted sums of fields over the sampled points of a layer; collective.
+    """Return weighted sums of fields over the quadrature points of a layer; collective.
 
     The weights differ from point to point, so a change at any point changes the sum.
 
     Args:
         scene: the scene.
         layer: name of the layer.
-        fields: {name of a field: function of a `Sample` that returns the values at its points}.
+        fields: {name of a field: function that returns its values at the points of a `Sample`, points with cells}.
 
     Returns:
         {name of a field: sum}.

@@ -70,7 +70,7 @@ class Fields:
         self._faces: dict[int, tuple[ContactFace, np.ndarray, np.ndarray]] = {}
 
     def evaluate(self, state: Any) -> dict[str, np.ndarray]:
-        """Return the fields of a state that the module docstring lists; collective.
+        """Return the fields of a state, such as "displacement", "cauchy_rr" and "contact_pressure"; collective.
 
         Args:
             state: a state on the mesh of the path.
@@ -234,7 +234,9 @@ def _gather(values: np.ndarray, comm: Any) -> Any:
 
 
 def _position_across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the positions of m points of a sheet between the n lines across it, from bottom to opposite top points.
+    """Return between which lines across a sheet m points lie.
+
+    Each of the n lines goes from a bottom point to the opposite top point. The lines are in order along the sheet.
 
     Args:
         points: the points, reference positions, shape (m, 2), length.
@@ -242,8 +244,8 @@ def _position_across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) ->
         top: top points opposite them, shape (n, 2), length.
 
     Returns:
-        Number k of the line before each point, shape (m,), and the position of the point between the lines k and k + 1,
-        0 to 1, shape (m,).
+        For each point a number k, shape (m,): it lies between the lines k and k + 1. Its position between them, 0 on
+        the line k, 1 on the line k + 1, shape (m,).
     """
     k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
     across = top - bottom

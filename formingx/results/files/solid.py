@@ -19,7 +19,8 @@ _EDGE_PIECES = 4  # number of straight pieces that replace the curved edge of an
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
     """Return the closed surface of a deformed sheet as triangles.
 
-    An axisymmetric section is revolved about the z axis. A section in plane strain is extruded along y, by its width.
+    An axisymmetric section is revolved about the z axis. A section in plane strain is extruded along y. The length of
+    the extrusion is the width of the section in r.
 
     Args:
         profile: the `Profile` of the section.
@@ -74,10 +75,11 @@ def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, 
 
 
 def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any) -> None:
-    """Write a surface from `coloured` as a binary STL file (rank 0 writes).
+    """Write the surface of a part as a binary STL file (rank 0 writes).
 
     Args:
-        surface: points, triangles and wall ratios; the ratios are not used.
+        surface: points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3);
+            wall over original thickness at the points, shape (n,), not used.
         file: its name ends in .stl.
         comm: MPI communicator.
 
@@ -90,10 +92,11 @@ def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: 
 
 
 def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any, units: Units = NONE) -> None:
-    """Write a surface from `coloured` as a binary glTF file, coloured by the wall ratio (rank 0 writes).
+    """Write the surface of a part as a binary glTF file, coloured by the wall ratio (rank 0 writes).
 
     Args:
-        surface: points, triangles and wall ratios.
+        surface: points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3);
+            wall over original thickness at the points, shape (n,).
         file: its name ends in .glb.
         comm: MPI communicator.
         units: units of the script, in which the points are given. The file is in metres; without a unit, lengths count
@@ -138,7 +141,7 @@ def _ends(number: np.ndarray) -> list[np.ndarray]:
     """Return the triangles of the two end faces of an extruded sheet, shape (k, 3) each.
 
     Args:
-        number: numbers of the points around the section at both ends, shape (2, n).
+        number: numbers of the points at both ends, shape (2, n), in order along the bottom and back along the top.
     """
     found = []
     for row, sense in ((number[0], 1), (number[1], -1)):

@@ -58,7 +58,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
 
 
 def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
-    """Return the positions along a path of frames that are evenly spaced over the progress of the process.
+    """Return the positions of frames along a path, evenly spaced over the progress of the process.
 
     Args:
         path: the computed `Path` of a sheet.
@@ -108,8 +108,8 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
 
     Args:
         shapes: `Profile` of the sheet in each frame.
-        tools: placed tools in each frame (`Tooling.placed`).
-        now: for each frame the names (x, y) of the columns of the loading curve, and their values in the frame.
+        tools: for each frame pairs of an active tool and its displacement (r, z), shape (2,), length.
+        now: for each frame a pair: names (x, y) of the columns of the loading curve, and their values [x, y] there.
         curves: {(x, y): values of both columns along the path, shape (m,) each}.
         axisymmetric: False in plane strain.
         units: units for the labels.

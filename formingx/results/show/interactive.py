@@ -61,7 +61,10 @@ def data(records: list[ReportData], names: list[str], units: Units, extra: dict[
 
 
 def _run(record: ReportData, name: str, units: Units) -> dict[str, Any]:
-    """Return the data of one run for `report.js`: its stages; columns, tools and the sheet in each drawn state."""
+    """Return the data of one run for `report.js` as a dictionary.
+
+    It holds the stages, and for each drawn state the main columns, the tools and the sheet.
+    """
     progress, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(progress[a]), "to": float(progress[b - 1])}
               for a, b in record.stage_ranges]
@@ -79,9 +82,10 @@ def _run(record: ReportData, name: str, units: Units) -> dict[str, Any]:
 def _sheet(record: ReportData, units: Units) -> dict[str, Any]:
     """Return the data of a sheet for `report.js`, at no more than 101 stations along it and in the drawn states.
 
-    Entries are "from" and "material", name and reference coordinates of the stations, and "bottom" and "top", the faces
-    (r, z) in each drawn state (`ReportData.frames`). "fields" has {label: values in each drawn state}: wall, wall
-    ratio and all fields of the record, such as the stress.
+    Returns:
+        "from": "R" or "Z", the reference coordinate that names the m stations. "material": this coordinate of the
+        stations, shape (m,). "bottom", "top": deformed positions of the faces, shape (states, 2, m). "fields": {label
+        with unit: values, shape (states, m)} of the wall, the wall ratio, and all fields of the record.
     """
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, FRAMES + 1)).round().astype(int))
@@ -115,9 +119,10 @@ def _label(record: ReportData, units: Units, key: str) -> str:
 def _tools(record: ReportData) -> list[dict[str, Any]]:
     """Return the data of each tool of a section for `report.js`.
 
-    Its "line" is the outline, its "shell" the outline moved inwards, to draw the tool with a thickness. "moves" is the
-    displacement per travel. "travel" has the travel in each drawn state (`ReportData.frames`), None while the tool is
-    inactive.
+    Returns:
+        For each tool a dictionary. "name": its name. "line": the outline, shape (2, n). "shell": the outline moved
+        inwards, shape (2, n), to draw the tool with a thickness. "moves": displacement (r, z) per unit of travel.
+        "travel": travel in each drawn state, None while the tool is inactive.
     """
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
@@ -135,9 +140,9 @@ def _tools(record: ReportData) -> list[dict[str, Any]]:
 
 
 def _loading(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any]]:
-    """Return charts (`_chart`) of loading curves: force of a tool over travel, or pressure over pole height.
+    """Return plotly charts of loading curves: force of a tool over travel, or pressure over pole height.
 
-    A chart has one curve for each stage of each run. `names` are the names of the runs.
+    A chart has one curve for each stage of each run. `names` has the name of each run, for the legend.
     """
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
@@ -181,9 +186,9 @@ def _driven(record: ReportData, stage: slice) -> list[tuple[str, str, np.ndarray
 
 
 def _in_time(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return charts of pressures, travels, tool forces and temperatures of the body over the process time.
+    """Return plotly charts of pressures, travels, tool forces and temperatures of the body over the process time.
 
-    A chart is the result of `_chart`. `names` are the names of the runs.
+    Runs without process time have no curves. `names` has the name of each run, for the legend.
     """
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
@@ -220,10 +225,10 @@ def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
 
 
 def _filling(records: list[ReportData], names: list[str], units: Units) -> dict[str, Any] | None:
-    """Return a chart of the remaining gap in each corner of the fixed tools, or None without corners.
+    """Return a plotly chart of the remaining gap in each corner of the fixed tools, or None without corners.
 
     The gaps are drawn over the process time if all runs have one, or else over the pressure in the last stage. `names`
-    are the names of the runs.
+    has the name of each run, for the legend.
     """
     traces, timed = [], all(record.timed for record in records)
     for record, name in zip(records, names):
@@ -239,10 +244,10 @@ def _filling(records: list[ReportData], names: list[str], units: Units) -> dict[
 
 
 def _walls(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return two charts of the wall thickness in the last state: over the height, and over the arc length.
+    """Return two plotly charts of the wall thickness in the last state: over the height, and over the arc length.
 
-    Both show the whole wall and, if there are several, each layer. A chart is None if no run has a profile. `names` are
-    the names of the runs.
+    Both show the whole wall and, if there are several, each layer. A chart is None if no run has a profile. `names` has
+    the name of each run, for the legend.
     """
     from ..evaluate.wall import Wall
     by_height, by_length = [], []
@@ -270,8 +275,11 @@ def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> di
         title: title of the chart.
         x: label of the horizontal axis.
         y: label of the vertical axis.
-        traces: the curves.
+        traces: the curves as data of plotly: "x", "y", "name", "mode".
         zero: axis that begins at 0, "x" or "y"; "": none.
+
+    Returns:
+        The arguments under their names, with the curves as plotly's scatter traces.
     """
     if not traces:
         return None

@@ -59,9 +59,10 @@ def convergence(path: Any, axes: Any = None) -> Any:
 def main_columns(columns: list[str]) -> tuple[str, str]:
     """Return the names (x, y) of the columns of the main loading curve.
 
-    With a travel, it is the force of the tool over its travel; with a pressure, the pressure over the pole height. Else
-    it is the pole height over the process time or, without time, the first column over the pole height. Where there is
-    no pole height, another measure of the deformation takes its place.
+    If there is a travel, the curve is the force of the tool over its travel. Else, if there is a pressure, it is the
+    pressure over the pole height. Else it is the pole height over the process time or, without time, the first column
+    over the pole height. Without a pole height, the enclosed volume, the strain energy or the volume
+    error takes its place.
 
     Args:
         columns: names of all columns of the path, in their order.

@@ -39,7 +39,7 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
         names: names of the runs; default 1, 2, ...
         units: units of the scripts, for the labels.
         density: density in g/cm3, for the weights in grams.
-        trim: place at which parts are cut off, see `Path.part`.
+        trim: radius at which parts are cut off, or ("height", h), length; default not cut.
 
     Returns:
         The path of the file.
@@ -75,8 +75,8 @@ def write(records: ReportData | list[ReportData], file: Any, title: str, failure
         comm: MPI communicator; rank 0 writes.
         units: units of the script, for the labels.
         density: density in g/cm3, for the weights in grams.
-        trim: place at which parts are cut off, see `Path.part`.
-        names: names of the runs; default the title.
+        trim: radius at which parts are cut off, or ("height", h), length; None: not cut.
+        names: names of the runs; None: a single run is named by the title.
 
     Returns:
         The path of the file.
@@ -106,7 +106,7 @@ def _part(record: ReportData, units: Units, density: float | None, trim: Any) ->
         record: the run.
         units: units of the script.
         density: density, g/cm3, or None.
-        trim: place at which the part is cut off, see `Path.part`, or None.
+        trim: radius at which the part is cut off, or ("height", h), length; None: not cut.
 
     Raises:
         InputError: a density or a trim is given, but there is no part.
@@ -263,7 +263,7 @@ def _cards(record: ReportData, found: Part | None, units: Units) -> str:
 
 
 def _peaks(record: ReportData, units: Units) -> list[tuple[str, str]]:
-    """Return rows (name, value) of the value of largest magnitude of the force on each tool, and of each pressure."""
+    """Return a row (name, value of largest magnitude in the run) for the force on each tool and for each pressure."""
     found = [(f"largest force on {name}", force, units.force) for name, force in record.forces.items()]
     found += [(f"largest {words(c)}", v, units.unit_of(c)) for c, v in record.measures.items()
               if c.endswith("pressure")]
@@ -304,9 +304,9 @@ def _lead(record: ReportData, units: Units) -> str:
 
 
 def _key_numbers(record: ReportData, units: Units) -> str:
-    """Return an HTML table of all columns, and of the smallest and the largest wall over original thickness.
+    """Return an HTML table of all output quantities, and of the smallest and largest wall over original thickness.
 
-    It has a column for each limit point and one for the last state.
+    The values in each limit point and in the last state stand side by side.
     """
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
@@ -320,7 +320,11 @@ def _key_numbers(record: ReportData, units: Units) -> str:
 
 
 def _stages(record: ReportData, units: Units) -> str:
-    """Return an HTML table with a row per stage: states, iterations, controls at its end, tool forces, gap, wall."""
+    """Return an HTML table with a row per stage.
+
+    A row has the numbers of states and iterations, the controls at the end, the largest force on each tool, the largest
+    gap in a corner at the end, and the smallest wall over original thickness at the end.
+    """
     columns = [c for end in CONTROLS for c in record.measures if c.endswith(end)]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
@@ -383,7 +387,10 @@ def _convergence(record: ReportData) -> str:
 
 
 def _iterations(record: ReportData, units: Units) -> str:
-    """Return an HTML table of the Newton iterations of each drawn state: control, corrections and last residual."""
+    """Return an HTML table of the Newton iterations of each state that the report draws.
+
+    A row has the control, the relative correction of the unknowns in each iteration, and the last residual.
+    """
     controls = {k: record.control(k) for k in record.frames}
     rows, columns = [], list(dict.fromkeys(controls.values()))
     for k, control in controls.items():

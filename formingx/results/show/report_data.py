@@ -40,18 +40,19 @@ class ReportData:
         kinds: kind of each state (`State.kind`).
         stages: name of the stage of each state, "" in a run without stages.
         measures: {column: values, shape (n,)}.
-        histories: for each state, rows (residual, correction, work) of the Newton iterations
-            (`formingx.solve.newton.Iteration`).
+        histories: for each state one row per Newton iteration: relative residual, relative correction of the unknowns,
+            relative work of the residual, and True for a chord iteration.
         profiles: for each state a `Profile`; None if the body is not a sheet, or if the state is not drawn (`frames`).
-        counts: cost of the run: {"iterations": ..., "seconds": ..., ...} as in `formingx.solve.record.Counts`.
-        until: target of the run (quantity, value), or None.
+        counts: cost of the run: numbers of "steps", "failures" and "iterations", duration in "seconds", and "limits",
+            {reason for a shorter or failed step: count}; {} if unknown.
+        until: target of the run (column, value), or None.
         tooling: the `Tooling` of the scene.
         travels: for each state the travel of each tool, length; None for an inactive tool (`Tooling.travels`).
         forces: {tool: force of the body on it, shape (n,)}, positive if it resists the travel. The force on a fixed
             tool is its Z component, positive if the body pushes the tool up.
         fields: for each drawn state {name: values at the m nodes of the profile, shape (m,)}. A record from a
             checkpoint has the temperature only.
-        layers: {layer: its fraction of the wall in the last state, shape (m,)} (`Wall.layers`).
+        layers: {layer: its fraction of the wall in the last state, 0 to 1, at the nodes of the profile, shape (m,)}.
         script: name of the file of the script, or "".
         findings: findings on the run (`Path.findings`); a checkpoint holds them once the run has ended.
         failure: error message that ended the run, or "".
@@ -109,7 +110,7 @@ class ReportData:
 
     @property
     def progress(self) -> np.ndarray:
-        """Progress of the process in each state, from 0 to 1, shape (n,)."""
+        """Progress in each state by process time, or without time by motion, from 0 to 1, shape (n,)."""
         return progress(self.measures, self.profiles)
 
     @property
@@ -206,7 +207,7 @@ class ReportData:
         return f"{words(column)} = {self.measures[column][state]:.5g}"
 
     def _volume_findings(self) -> list[Finding]:
-        """Return the finding on the state in which the elements keep their volumes worst, in a list; else []."""
+        """Return a finding on the state with the largest error of the element volumes in a list; [] if it is small."""
         errors = self.measures["volume_error"]
         k = int(np.argmax(errors))
         first = int(np.argmax(errors > NOTICEABLE))
@@ -223,7 +224,7 @@ class ReportData:
                     f" be used: {self.inadmissible_reasons[k]}.")]
 
     def warnings(self) -> list[str]:
-        """Return the texts of `all_findings`."""
+        """Return the texts of all findings on the run, the worst first."""
         return [finding.text for finding in self.all_findings()]
 
     def _smallest_thickness(self) -> float | None:
@@ -273,8 +274,9 @@ def of_checkpoint(about: dict, states: list[dict]) -> ReportData:
     Both arguments are results of `formingx.results.files.checkpoint_data.contents`.
 
     Args:
-        about: data of the file scene.json; its entry "ended" has the error message and the findings of the run.
-        states: data of each state.
+        about: data of the file scene.json: the description of the scene, its summary, and versions of programs. Its
+            entry "ended" has the error message and the findings of the run.
+        states: for each state its attributes as {name: value}.
     """
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     ended = about.get("ended") or {"findings": (), "failure": ""}
@@ -294,10 +296,10 @@ def of_checkpoint(about: dict, states: list[dict]) -> ReportData:
 
 
 def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
-    """Return {"heat": `ReportData.heat`, "unit": `ReportData.unit`}; empty for a scene without heat transfer.
+    """Return the arguments "heat" and "unit" of `ReportData`; empty for a scene without heat transfer.
 
     Args:
-        heat: heat transfer of the scene as plain data (`description.plain`), or None.
+        heat: heat transfer of the scene as JSON data, with entries "tools" and "unit", or None.
     """
     if not heat:
         return {}
@@ -338,7 +340,7 @@ def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: i
     progress of the process, and the number of the state over the number of states.
 
     Args:
-        progressed: progress of the process in n states (`progress`), shape (n,).
+        progressed: progress of the process in n states, by time or motion, from 0 to 1, shape (n,).
         kinds: kind of each state (`State.kind`).
         stages: name of the stage of each state.
         count: approximate number of drawn states.
