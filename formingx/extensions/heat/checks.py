@@ -145,13 +145,15 @@ def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def beyond_known_range(body: Any) -> Iterator[Finding]:
-    """Find constants that are unknown at temperatures to which tools, air and heaters may bring the body; collective.
+    """Find constants whose given range of temperatures is smaller than the range that the body may reach; collective.
+
+    Initial temperature, tools, air and heaters bound the temperatures that the body may reach.
 
     Args:
         body: the examined body, with its `scene`.
 
     Yields:
-        A warning for each constant and each end of its range of temperatures that the body may pass.
+        A warning for each constant and each end of its range that the temperature of the body may pass.
     """
     if body.scene.heat is not None:
         low, high = body.scene.heat.extremes(body.scene)
@@ -160,7 +162,7 @@ def beyond_known_range(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def passed_known_range(path: Any) -> Iterator[Finding]:
-    """Find constants that were unknown at temperatures of the run; collective.
+    """Find constants whose given range of temperatures is smaller than the range of the body in a run; collective.
 
     Constants about which a check warned before the run are left out.
 
@@ -168,7 +170,7 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
         path: the computed `Path`.
 
     Yields:
-        A warning for each constant and each end of its range of temperatures that the body passed.
+        A warning for each constant and each end of its range that the temperature of the body passed.
     """
     reported = {finding.about for finding in path.record.findings}
     states = path.segments[-1].states

@@ -163,7 +163,7 @@ class Conduction(HeatVectors):
                 excess temperatures over its back, at m nodes along the depth, shape (contact nodes, m).
             known: heats k from earlier stages: of the body over its heat capacity, degrees, shape (n,); of each tool in
                 contact per contact area, shape (contact nodes, m).
-            c: time c by which the stage multiplies rates of heat.
+            c: factor c of the rates of heat in the stage, time.
             guess: initial guess of the change of the temperatures of the body, locally owned entries, shape (n,).
 
         Returns:
@@ -202,7 +202,7 @@ class Conduction(HeatVectors):
         Args:
             known: heats k of the body over its heat capacity, degrees, shape (n,). Then of each tool in contact per
                 contact area, at m nodes along the depth, shape (contact nodes, m).
-            c: time c by which the step multiplies rates of heat.
+            c: factor c of the rates of heat in the step, time.
 
         Returns:
             Largest absolute change of body and tools over all ranks, degrees.
@@ -259,7 +259,7 @@ class Conduction(HeatVectors):
             change: change of these temperatures in the stage, shape (n,).
             known: heats of the body from earlier stages, over its heat capacity, degrees, shape (n,). Then of each tool
                 in contact per contact area, at m nodes along the depth, shape (contact nodes, m).
-            c: time by which the stage multiplies rates of heat.
+            c: factor of the rates of heat in the stage, time.
             responses: `ToolResponse` of each tool in contact.
         """
         R = self._body_rate(T + change)
@@ -313,9 +313,14 @@ class Conduction(HeatVectors):
         return [(m, self._dx if everywhere else self._dx(tuple(tags))) for m, tags in groups.values()]
 
     def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
-        """Return the heat of the body at temperature T, divided by its heat capacity, as a form with test function v.
+        """Return the form of the heat density at a temperature times a test function, multiplied by `_scale`.
 
-        materials: {layer: `ThermalProperties`}. T, v: UFL scalars. Without `capacity` (`_scale` = 1) it is the heat.
+        `_scale` is 1 until `capacity`, the heat capacity of the whole body, is known, and then 1 over `capacity`.
+
+        Args:
+            materials: {layer: `ThermalProperties`}.
+            T: temperature (UFL scalar).
+            v: test function (UFL scalar).
         """
         return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
                    for m, dx in self._layer_measures(materials))
@@ -349,7 +354,7 @@ class Conduction(HeatVectors):
         self._solver = DirectSolver(self._matrix, symmetric=False)
 
     def _coefficient(self, value: float | Table) -> Any:
-        """Return the parameter of a law, a number or a table over R, as a UFL coefficient."""
+        """Return a parameter of a law, a number or a table over R, as a UFL scalar: the table is evaluated at R."""
         return value(self._X[0]) if isinstance(value, Table) else self.constant(value)
 
     def _ds(self, boundary: str, metadata: dict) -> ufl.Measure:
@@ -358,11 +363,11 @@ class Conduction(HeatVectors):
         return ds(self.mesh.boundaries[boundary], metadata=metadata)
 
     def _dofs(self, boundary: str) -> np.ndarray:
-        """Return the local temperature unknowns on a boundary, with ghosts."""
+        """Return the local numbers of the temperature unknowns on a boundary, with ghosts."""
         return fem.locate_dofs_topological(self.space, 1, self.mesh.facets_of(boundary))
 
     def _set_fixed_values(self, fixed: list[FixedTemperature]) -> None:
-        """Store the local unknowns on the faces of prescribed temperature, and their values."""
+        """Set `_fixed_values`, prescribed temperatures, `_fixed_mask`, the mask of their nodes, `_bcs` and `_fixed`."""
         self._fixed_mask = np.zeros(self._n, dtype=bool)
         self._fixed, self._bcs, taken = [], [], self._fixed_mask.copy()
         for boundary in fixed:
@@ -403,7 +408,7 @@ class Conduction(HeatVectors):
         return points if u is None else points + u
 
     def _face_line(self, boundary: str) -> np.ndarray:
-        """Return the deformed nodes of a boundary in order along it, shape (k, 2), length, all ranks."""
+        """Return the deformed positions of the k nodes of a boundary of all ranks, in order, shape (k, 2), length."""
         line = self.mesh.line_of(boundary)
         u = self.displacements()
         if u is None:
@@ -418,7 +423,7 @@ class Conduction(HeatVectors):
         """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of rates of heat at the last `T`.
 
         Args:
-            c: time by which the stage multiplies rates of heat.
+            c: factor of the rates of heat in the stage, time.
             responses: `ToolResponse` of each tool in contact, whose conductance adds to the diagonal.
             afresh: True to factorise in any case; False to keep the last factors if they have the same c.
         """

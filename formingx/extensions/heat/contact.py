@@ -58,7 +58,7 @@ class ConductingTool:
 
     @property
     def depths(self) -> np.ndarray:
-        """Distances of the nodes of the wall from its face, to the back, shape (2 elements + 1,), length."""
+        """Distances of the nodes of the tool from its face, from 0 to `thickness`, shape (2 elements + 1,), length."""
         from scipy.optimize import brentq
         n, small = self.elements, self.finest
         ratio = 1.0
@@ -237,7 +237,7 @@ class HeatContact:
             excess: excess temperatures w of the tool over its back, at the m nodes along the depth below each of the n
                 contact nodes, shape (n, m), degrees. The face comes first.
             known: heats k per contact area at the nodes of the tool, from earlier stages of the step, shape (n, m).
-            c: time c by which the stage multiplies rates of heat.
+            c: factor c of the rates of heat in the stage, time.
             absolute: False if the temperatures of body and tool are differences of two states; the back then has 0.
 
         Returns:
@@ -261,7 +261,7 @@ class HeatContact:
             response: result of `response`.
             known: heats per contact area at the nodes of the tool, from earlier stages of the step, shape (n, m).
             T: temperatures of the body at the contact nodes, shape (n,).
-            c: time by which the stage multiplies rates of heat.
+            c: factor of the rates of heat in the stage, time.
 
         Returns:
             Flux q into the body, heat per time and area, shape (n,). Changes of temperature in the tool, degrees, shape
@@ -278,7 +278,7 @@ class HeatContact:
         results: (m, m) and (m,).
 
         Args:
-            c: time by which the stage of a time step multiplies rates of heat.
+            c: factor of the rates of heat in the stage of a time step, time.
         """
         inverse = np.linalg.inv(self._M + c * self._K)
         return inverse, c * inverse[:, 0]

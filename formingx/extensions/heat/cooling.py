@@ -216,7 +216,9 @@ class Cooling:
         return contact.name in self.tools
 
     def contacts_with_tools(self, scene: Any) -> list[ContactWithTool]:
-        """Return a law of heat, with complete contact, for each contact of a scene whose tool exchanges heat.
+        """Return a law of heat for each contact of a scene whose tool exchanges heat.
+
+        The laws hold for contact at all nodes. A run sets the conductance to 0 at nodes away from the tool.
 
         Args:
             scene: the `Scene`.

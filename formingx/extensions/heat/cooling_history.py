@@ -86,7 +86,9 @@ class CoolingHistory:
                           checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
 
     def _tool_contacts(self, body: Conduction) -> list[tuple[Any, Any, np.ndarray]]:
-        """Return (`HeatContact` of `body`, contact of the problem, nodal conductances) of each tool with heat exchange.
+        """Return (`HeatContact` of `body`, contact of the problem, conductances) for each tool with heat exchange.
+
+        The conductances, shape (n,), are the values in contact at the n nodes of the `HeatContact`.
         """
         contacts = [c for c in self._problem.contacts if self._cooling.conducts(c.contact)]
         return [(touch, contact, touch.conductance.copy())
@@ -330,8 +332,8 @@ def _finer_elements(scene: Any, times: float, duration: float) -> str:
 
     Args:
         scene: the scene whose sheet gets the finer elements.
-        times: present error over the wanted error. The error is of third order in the element size.
-        duration: time during which heat has penetrated.
+        times: factor by which the error must decrease. The error is of third order in the element size.
+        duration: time during which heat has penetrated, for the depth of the thin elements.
     """
     laws = {law.on for law in [*scene.heat.boundaries, *scene.heat.contacts_with_tools(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
@@ -343,7 +345,12 @@ def _finer_elements(scene: Any, times: float, duration: float) -> str:
 
 
 def _equal(a: Any, b: Any) -> bool:
-    """Return True if two triples a and b (time, temperatures, None or (earlier time, temperatures)) are equal."""
+    """Return True if the temperatures of two steps are equal.
+
+    Args:
+        a: (time, temperatures, start) of the first step, where `start` is (time, temperatures) at its start, or None.
+        b: the same data of the second step.
+    """
     same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
     return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
 

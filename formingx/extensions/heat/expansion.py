@@ -42,7 +42,7 @@ class ThermalExpansion:
         self.stretch(np.array([self.stress_free]))
 
     def volume_ratio(self, temperature: Any) -> np.ndarray:
-        """Return the volume over the volume at `stress_free`, both without stress.
+        """Return the stress-free volume at a temperature over the volume at T_0, the argument `stress_free`.
 
         Args:
             temperature: temperatures, any shape.
@@ -53,7 +53,7 @@ class ThermalExpansion:
         return self.stretch(temperature) ** 3
 
     def stretch(self, temperature: Any, clamped: bool = False) -> np.ndarray:
-        """Return the length over the length at `stress_free`, both without stress: the cube root of `volume_ratio`.
+        """Return the stress-free length at a temperature over the length at T_0, the argument `stress_free`: J_T^(1/3).
 
         Args:
             temperature: temperatures, any shape.

@@ -55,11 +55,11 @@ def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[
     Args:
         mesh: mesh of the sheet.
         faces: "bottom", "top" or both.
-        part: largest allowed thickness of the layer at a face, over the thickness of the present elements there.
-        depth: penetration depth of heat, length; the layer at a face is at most `_LAYER_THICKNESS` of it.
+        part: largest allowed thickness of the new layer at a face, over the height of the present elements there.
+        depth: penetration depth of heat, length. The layer at a face is at most `_LAYER_THICKNESS` times as thick.
 
     Returns:
-        Sizes, dimensionless, as the argument `elements=(n, sizes)` of a mesh takes them.
+        Relative sizes of the n layers, dimensionless, for the argument `elements=(n, sizes)` of a mesh.
     """
     grid = gathered(mesh)
     heights, lengths, area = zip(*(_boundary_sizes(grid, face) for face in faces))
@@ -83,7 +83,16 @@ def height_at(mesh: Mesh, face: str) -> float:
 
 
 def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
-    """Return (median height of the elements at the boundary `face`, length of the boundary, area of the whole grid)."""
+    """Return sizes of the elements along a boundary and of the grid.
+
+    Args:
+        grid: the grid.
+        face: name of the boundary.
+
+    Returns:
+        Median height of the elements perpendicular to the boundary, length; length of the boundary; area of the whole
+        grid, length^2.
+    """
     triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
     double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
     ends = grid.boundaries[face][:, :2]
@@ -94,17 +103,17 @@ def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-    """Return where the edges of elements are cut, so that elements below heated or cooled faces become thin layers.
-
-    Returns:
-        {(first, last): cuts}: node numbers of the ends of an edge, and the increasing positions of its cuts, where 0 is
-        the first end and 1 the last. The first end has the smaller (R, Z). Edges without cuts are left out.
+    """Return the positions of cuts on edges, which divide elements below heated or cooled faces into thin layers.
 
     Args:
         grid: the grid.
         depths: {boundary: penetration depths of heat at the first and the last time of interest, length}.
         points: positions of the nodes of the grid in the configuration in which depths below a boundary are measured,
             shape (n, 2), length.
+
+    Returns:
+        {(first, last): cuts}: node numbers of the ends of an edge, and the increasing positions of its cuts, where 0 is
+        the first end and 1 the last. The first end has the smaller (R, Z). Edges without cuts are left out.
     """
     if not depths:
         return {}
@@ -128,9 +137,11 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
 
 
 def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the distance of each point from the nearest edge of a boundary, shape (n,), length.
+    """Return the distance of each node of a grid from the nearest edge of a boundary, shape (n,), length.
 
-    points: positions, shape (n, 2), length. edges: numbers of the two ends of each edge in `points`, shape (m, 2).
+    Args:
+        points: positions of the n nodes, shape (n, 2), length.
+        edges: node numbers of both ends of the m straight edges of the boundary, shape (m, 2).
     """
     away = np.full(len(points), np.inf)
     for a, b in points[edges]:
@@ -140,9 +151,11 @@ def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return edges with the end of smaller R first, at equal R of smaller Z, shape (n, 2).
+    """Return edges with sorted ends, shape (n, 2): first the end of smaller R, or of smaller Z if both have the same R.
 
-    points: positions (R, Z), shape (m, 2), length. edges: numbers of the two ends of each edge, shape (n, 2).
+    Args:
+        points: positions (R, Z) of the m nodes, shape (m, 2), length.
+        edges: node numbers of both ends of n edges, shape (n, 2).
     """
     a, b = points[edges[:, 0]], points[edges[:, 1]]
     swap = (a[:, 0] > b[:, 0]) | (a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1])
@@ -150,14 +163,14 @@ def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 class _Nodes:
-    """Nodes of the cut grid: the nodes of the grid, and new ones on cut edges and inside triangles.
+    """Nodes of a grid whose elements are cut into layers: the old nodes, and new ones on cut edges and in triangles.
 
     Args:
         grid: the grid before the cut.
         cuts: {(first, last): cuts}: node numbers of the ends of an edge, and the positions of its cuts, from 0 to 1.
 
     Attributes:
-        points: positions of all nodes so far, length.
+        points: list of the positions of all nodes so far, shape (2,) each, length.
     """
 
     def __init__(self, grid: Grid, cuts: dict[tuple[int, int], np.ndarray]):
@@ -195,7 +208,13 @@ class _Nodes:
         return self._middles[key]
 
     def keep(self, a: int, b: int, middle: int) -> None:
-        """Store the number of the existing middle node of an uncut edge between nodes a and b."""
+        """Store the middle node of an edge without cuts, so that `middle` returns it.
+
+        Args:
+            a: node number of the first end.
+            b: node number of the other end.
+            middle: number of the existing middle node.
+        """
         self._middles[min(a, b), max(a, b)] = middle
 
     def _new(self, point: Any) -> int:
@@ -205,9 +224,11 @@ class _Nodes:
 
 
 def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return the points at parameters s, shape (n,), from 0 to 1, of an edge, shape (n, 2), length.
+    """Return n points of an edge, shape (n, 2), length.
 
-    curve: nodes of the edge: its ends, and its middle if it is quadratic, shape (2, 2) or (3, 2), length.
+    Args:
+        curve: positions of its ends, and of its middle if it is quadratic, shape (2, 2) or (3, 2), length.
+        s: parameters of the points, 0 at the first end and 1 at the second, shape (n,).
     """
     s = np.asarray(s, dtype=float)[:, None]
     if len(curve) == 2:
@@ -216,14 +237,19 @@ def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the point at area coordinates x, shape (3,), of a triangle; `nodes`: positions of its 3 or 6 nodes."""
+    """Return the position of a point of a triangle, shape (2,), length.
+
+    Args:
+        nodes: positions of the nodes of the triangle, shape (3, 2) or (6, 2), length.
+        x: area coordinates of the point, shape (3,).
+    """
     if len(nodes) == 3:
         return x @ nodes
     return (x * (2 * x - 1)) @ nodes[:3] + 4 * np.array([x[0] * x[1], x[1] * x[2], x[2] * x[0]]) @ nodes[3:]
 
 
 def _cut_grid(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
-    """Return the grid with edges cut, and its triangles cut into rows between these cuts.
+    """Return a grid with cut edges, in which triangles are divided into smaller ones between the cuts of their edges.
 
     Args:
         grid: the grid.
@@ -251,7 +277,7 @@ def _integer_rows(table: np.ndarray) -> list[list[int]]:
 
 
 def _pieces(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
-    """Cut one triangle, and return its pieces as lists of node numbers.
+    """Cut one triangle into smaller ones, and return a list of 3 or 6 node numbers for each.
 
     Args:
         grid: the grid before the cut.

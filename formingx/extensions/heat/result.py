@@ -343,7 +343,8 @@ class HeatRun:
     def _state_at(self, time: float | None) -> list[np.ndarray]:
         """Return the temperatures of body and tools at a time, as an entry of `states`; None: the end of the run.
 
-        Within a step Hermite's cubic is used, with slopes from the parabolas through three steps.
+        Between two accepted states Hermite's cubic is used. Its slope in a state is the slope of the parabola through
+        this state and its two neighbours.
 
         Raises:
             InputError: a time outside the run.
@@ -364,7 +365,11 @@ class HeatRun:
                 for va, vb, da, db in zip(a, b, slope_a, slope_b)]
 
     def _slope(self, k: int) -> list[np.ndarray]:
-        """Return the time derivative of the temperatures after step k, from the parabola through three steps."""
+        """Return the time derivatives of the temperatures in state k, degrees per time, with the shapes of `states[k]`.
+
+        They are slopes of the parabola through this state and its two neighbours. At both ends of the run it is the
+        parabola through the nearest three states. Of two states the chord is used.
+        """
         i = min(max(k, 1), len(self._times) - 2)
         if i < 1:
             return [(b - a) / (self._times[1] - self._times[0]) for a, b in zip(*self.states[:2])]
@@ -384,7 +389,7 @@ class HeatRun:
         """Return the first time at which the function `excess` of time is 0 or negative; None if there is none.
 
         Args:
-            excess: function of time.
+            excess: function of time that returns a float.
             times: times of steps to examine, in order. Between two of them the root is computed.
             from_time: a time before the first of `times`, from which on a root is sought, or None.
         """

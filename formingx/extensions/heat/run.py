@@ -97,8 +97,8 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
     """Return {boundary: (smallest, largest) penetration depth of heat, length}.
 
     A depth is sqrt(a t) with a diffusivity a and a time t. The smallest has the smallest diffusivity of all layers. Its
-    time is the first output time, or `_FIRST_ACCURATE_TIME` of the last one if that is earlier. The largest has the
-    largest diffusivity, and its time is the last output time. At a boundary with absorption the smallest is 1 /
+    time is the first output time, or `_FIRST_ACCURATE_TIME` times the last output time if this is earlier. The largest
+    has the largest diffusivity, and its time is the last output time. At a boundary with absorption the smallest is 1 /
     absorption coefficient, or the smaller of both if another law acts there too.
 
     Args:
@@ -193,7 +193,15 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
 
 
 def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
-    """Estimate the discretisation error at the output times; warn if it exceeds `WARNED_ERROR` and `tolerance`."""
+    """Estimate the discretisation error of a run at its output times, and warn if it is too large.
+
+    It is too large above `tolerance` and above `WARNED_ERROR` times the span of temperatures in the run.
+
+    Args:
+        run: the run; its `errors_in_space` are set.
+        estimator: the estimator, which is destroyed at the end.
+        tolerance: largest estimated time integration error of one step, degrees.
+    """
     try:
         run.errors_in_space = np.array([estimator.largest(run.states[k], run.times[k])
                                         for k in np.searchsorted(run.times, run.outputs)])

@@ -31,8 +31,9 @@ class SpaceError:
     def largest(self, state: list[np.ndarray], time: float) -> float:
         """Estimate the largest discretisation error of the temperature in a state; collective.
 
-        The estimate is the largest entry of the correction e (see the module). Its right-hand side contains the present
-        temperatures of the faces of tools. In the matrix the tools respond to e: their temperatures change with it.
+        The estimate is the largest absolute nodal value of a correction e in the space of cubic elements. It satisfies
+        (M + t K) e = t (R(T) - M dT/dt), with capacity matrix M, conductivity matrix K, rate of heat R and time t. R
+        contains the present temperatures of the faces of tools. K contains the response of the tools to e.
 
         Args:
             state: temperatures of the body, shape (n,). Then for each tool in contact its excess temperatures over its

@@ -131,9 +131,9 @@ class HeatVectors:
         return self._assemble(self._mass_form)
 
     def _largest(self, values: np.ndarray) -> float:
-        """Return the largest absolute entry of an array over all ranks."""
+        """Return the largest absolute value of the locally owned entries `values`, shape (n,), over all ranks."""
         return float(combined(self.comm, np.abs(values).max(initial=0.0), MPI.MAX))
 
     def _sum(self, values: np.ndarray) -> float:
-        """Return the sum of the entries of an array over all ranks."""
+        """Return the sum of the locally owned entries `values`, shape (n,), over all ranks."""
         return float(combined(self.comm, values.sum(), MPI.SUM))

@@ -34,8 +34,8 @@ class MemoryIntegral:
 
     Args:
         spectrum: list of (G, tau), stress and time.
-        damping: a `Damping`, or None.
-        irreversible: True if h of a past state is the smallest value that it has had since then.
+        damping: a `Damping`, or None for h = 1.
+        irreversible: True if h of a past state never increases: its smallest value so far applies.
         shifted: True if the reduced time of the material depends on the temperature.
     """
 
@@ -51,7 +51,7 @@ class MemoryIntegral:
         self.damping, self.irreversible, self.shifted = damping, irreversible, shifted
 
     def history(self, forms: Any, terms: Any) -> PastStates:
-        """Return the history variables (past states) of a material with this stress.
+        """Return the history variables of a material with this integral: its past states.
 
         Args:
             forms: the `Formulation`.
@@ -130,17 +130,18 @@ class MemoryIntegral:
 
     def inverses_and_damping(self, C: np.ndarray, past: np.ndarray,
                              smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
-        """Return inverse tensors and damping of K past states at n points.
+        """Return the inverse tensors Cbar_k^-1 and the damping of K past states at n points.
 
         Args:
             C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
             past: entries of Cbar in the past states, shape (K, 4, n).
-            smallest_h: smallest value that the damping h of each state has had since then, which bounds it now, shape
-                (K, n). None: h is not bounded.
+            smallest_h: smallest damping h that has applied to each past state so far: an upper bound of h, shape
+                (K, n). None: no bound.
 
         Returns:
-            Inverse tensors of the past states, shape (K, 4, n). Damping h, the factor of a past state's stress, and its
-            derivatives by I1 and I2, shape (K, n) each. These are the invariants of the Finger tensor since that state.
+            Entries of Cbar_k^-1, shape (K, 4, n). Damping h, a factor of the stress due to each past state, and its
+            derivatives by I1 and I2, shape (K, n) each. I1 and I2 are the traces of the Finger tensor of the
+            deformation since the past state, and of its inverse.
         """
         inverse = _inverse(past)
         if self.damping is None:
@@ -156,18 +157,19 @@ class MemoryIntegral:
 
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
                smallest_h: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the second Piola-Kirchhoff stress from K past states at n points, without pressure, and derivatives.
+        """Return the second Piola-Kirchhoff stress from K past states at n points, without pressure, and its slopes.
 
         Args:
             C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
             past: entries of Cbar in the past states, shape (K, 4, n).
-            W: weights of the states, shape (K, n), stress.
-            slope: derivatives of the weights by the length of the step in reduced time, shape (K, n), stress/time.
-            smallest_h: smallest value that the damping h of each state has had since then, which bounds it now, shape
-                (K, n). None: h is not bounded.
+            W: weights of the past states at the end of the step, shape (K, n) or (K, 1), stress.
+            slope: derivative of W by the length of this step in reduced time, shape of W, stress/time.
+            smallest_h: smallest damping h that has applied to each past state so far: an upper bound of h, shape
+                (K, n). None: no bound.
 
         Returns:
-            Stress S, dS/dCbar and dS/dstep, shapes (4, n), (4, 4, n) and (4, n).
+            Stress S, shape (4, n); dS/dCbar, shape (4, 4, n); derivative of S by the length of the step in reduced
+            time, shape (4, n).
         """
         inverse, h, h1, h2 = self.inverses_and_damping(C, past, smallest_h)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
@@ -233,18 +235,20 @@ def _inverse(C: np.ndarray) -> np.ndarray:
 def _change(C: Any, coefficients: dict[str, Any]) -> list[Any]:
     """Return the change of the entries 11, 22, 12, 33 of Cbar = J^(-2/3) C since the stress was last linearised (UFL).
 
-    C: present entries of Cbar. coefficients: {name: UFL coefficient}; "past_C" has the entries at the linearisation.
+    Args:
+        C: present entries of Cbar (UFL).
+        coefficients: {name: UFL coefficient}; "past_C" has the entries of Cbar at the last linearisation.
     """
     return [C[i] - coefficients["past_C"][i] for i in range(4)]
 
 
 def _mean_decay(x: np.ndarray) -> np.ndarray:
-    """Return (1 - e^-x)/x, the mean of e^-t for t from 0 to x."""
+    """Return (1 - e^-x)/x, the mean of e^-t for t from 0 to x; x is an array of any shape."""
     return np.where(x < 1e-12, 1.0, -np.expm1(-x) / np.where(x < 1e-12, 1.0, x))
 
 
 def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
-    """Return the derivative of (1 - e^-x)/x by x."""
+    """Return the derivative of (1 - e^-x)/x by x, an array of any shape."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = -1 / 2 + x / 3 - x**2 / 8 + x**3 / 30 - x**4 / 144
@@ -254,7 +258,7 @@ def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
 def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
     r"""Return the factors of the three states that fix a parabola in time, shape of s each.
 
-    At the part t of the step the parabola deviates from its chord by
+    At a fraction t of the step, from 0 to 1, the parabola deviates from its chord by
 
     .. math:: -t (1 - t) \left(f y_1 - f (1 + s) y_0 + f s y_{-1}\right), \qquad f = \frac{s}{1 + s}
 
@@ -271,9 +275,12 @@ def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
 
 
 def _parabola_factor_slopes(s: Any) -> tuple[Any, Any]:
-    """Return the derivatives by s of the factors of the states at the start of a step, and of the previous step.
+    """Return the derivatives by s of f (1 + s) and f s, the last two results of `_parabola_factors`.
 
-    s: length of the step over the length of the previous one, any shape, as of the results.
+    They are the factors of the states at the start of a step and at the start of the previous step.
+
+    Args:
+        s: length of the step over the length of the previous one, any shape, as of the results.
     """
     s = np.minimum(s, 4.0)
     share, slope = np.minimum(1.0, 2 - s / 2) * s, np.where(s < 2, 1.0, np.where(s < 4, 2 - s, 0.0))

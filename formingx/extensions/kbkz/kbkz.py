@@ -48,7 +48,7 @@ class KBKZ(RelaxingMaterial):
         damping: damping function h, such as `PSM` or `Wagner`; None: h = 1.
         equilibrium: a material without relaxation whose stress is added, or None.
         shift: temperature dependence of the relaxation times, see `Viscoelastic`; None: constant times.
-        irreversible: True if h of a past state is the smallest value that it has had since then.
+        irreversible: True if h of a past state never increases: its smallest value so far applies.
 
     Raises:
         InputError: an argument that is not allowed.
@@ -103,19 +103,19 @@ class KBKZ(RelaxingMaterial):
         return self.damping is None or self.damping.of_I1_alone
 
     def shear_modulus_at(self, sample: Sample) -> np.ndarray:
-        """Return the instantaneous shear modulus at the points of a sample.
+        """Return the instantaneous shear moduli for the values that varying constants have at quadrature points.
 
         Args:
-            sample: the `Sample` with n points, at which constants of the equilibrium are evaluated.
+            sample: the `Sample`, at which the constants of `equilibrium` have n distinct sets of values.
 
         Returns:
-            Moduli, shape (n,) or (1,), stress.
+            Modulus for each set, shape (n,), stress; shape (1,) without `equilibrium`.
         """
         equilibrium = 0.0 if self._equilibrium is None else self._equilibrium.shear_modulus_at(sample)
         return np.atleast_1d(sum(G for G, _ in self.spectrum) + equilibrium)
 
     def strain_energy(self, F, **constants):
-        """Return the energy of the instantaneous response without damping, for moduli and stresses at F = I.
+        """Return the energy of the instantaneous response without damping, which gives moduli and stresses at F = I.
 
         Args:
             F: deformation gradient (UFL, shape (3, 3)).
@@ -155,7 +155,7 @@ class KBKZ(RelaxingMaterial):
         return self.step_energy(F, internal, 0.0, **constants)
 
     def _modulus(self, times):
-        """Return the relaxation modulus of the spectrum at times, without the equilibrium, stress."""
+        """Return the relaxation modulus of the spectrum at `times`, any shape, without `equilibrium`, stress."""
         return sum(G * np.exp(-np.asarray(times, float) / tau) for G, tau in self.spectrum)
 
     def stress(self, mode: str = "biaxial", stretches: ArrayLike = (), times: ArrayLike | None = None,
@@ -228,7 +228,9 @@ class KBKZ(RelaxingMaterial):
         return np.array(found)
 
     def _biaxial(self, l: np.ndarray) -> np.ndarray:
-        """Return the two nominal stresses after a sudden biaxial stretch; l: stretches (l1, l2); shape (2, ...) each.
+        """Return the nominal stresses in both directions after a sudden biaxial stretch, shape (2, ...).
+
+        l: the two stretches, shape (2, ...).
         """
         if l.shape[:1] != (2,) or not np.all((l > 0) & np.isfinite(l)):
             raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), each above 0")
@@ -277,9 +279,13 @@ class KBKZ(RelaxingMaterial):
         return float(initial + np.sum(half * _WEIGHTS * memory * self._damped_difference(mode, relative)))
 
     def _panel_ends(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-        """Return the ends of the quadrature panels of the memory integral, ages before the last time, ascending.
+        """Return the ends of the quadrature panels of the memory integral, as ages, ascending, shape (k,), time.
 
-        times and stretches: those of the test, shape (n,) each.
+        An age is the time from an instant of the test to its last time.
+
+        Args:
+            times: times of the test, shape (n,).
+            stretches: stretches at these times, shape (n,).
         """
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANEL_AGE_RATIO)) + 1)
@@ -292,7 +298,14 @@ class KBKZ(RelaxingMaterial):
         return found[found <= whole]
 
     def _damped_difference(self, mode: str, stretch: np.ndarray) -> np.ndarray:
-        """Return h (B_11 - B_33) after a sudden stretch in a mode, of the shape of `stretch`."""
+        """Return h (B_11 - B_33) after a sudden stretch, dimensionless, with the shape of `stretch`.
+
+        B is the Finger tensor of the stretch, h its damping. Direction 1 is stretched, direction 3 is free of stress.
+
+        Args:
+            mode: "uniaxial", "pure_shear" or "equibiaxial".
+            stretch: stretch in direction 1, any shape.
+        """
         square = np.asarray(stretch, float)[..., None] ** (2 * np.array([1, MODES[mode], -1 - MODES[mode]]))
         difference = square[..., 0] - square[..., 2]
         return difference if self.damping is None else difference * self.damping(square.sum(-1), (1 / square).sum(-1))
@@ -307,7 +320,14 @@ class KBKZ(RelaxingMaterial):
 
 
 def _interpolated(t: np.ndarray, times: np.ndarray, stretches: np.ndarray, between: str) -> np.ndarray:
-    """Return the stretches of a test at times t; "stretch" or "strain" (`between`) is linear between its times."""
+    """Return the stretches of a test at times t, with the shape of t.
+
+    Args:
+        t: times at which the stretch is interpolated, any shape.
+        times: times of the test, shape (n,).
+        stretches: stretches at these times, shape (n,).
+        between: quantity that is linear between two times of the test, "stretch" or "strain" (logarithmic).
+    """
     if between == "stretch":
         return np.interp(t, times, stretches)
     return np.exp(np.interp(t, times, np.log(stretches)))

@@ -43,7 +43,7 @@ class StoredStates(NamedTuple):
     Attributes:
         time: process time of the last accepted state.
         states: the past states, up to the last accepted one.
-        smallest_h: smallest damping h that each past state has had since then, shape (K, n), or None.
+        smallest_h: smallest damping h that has applied to each past state so far, shape (K, n); None if h may increase.
     """
 
     time: float
@@ -87,9 +87,9 @@ class PastStates:
         self.put(StoredStates(0.0, (undeformed,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def forget_motion(self) -> None:
-        """Discard the length of the last step: the stress of a past state is then linear in time over the next step.
+        """Discard the length of the last step, so that the stress integrand is linear in time over the next step.
 
-        With this length it would be a parabola through the last two states and the end of the step.
+        With this length it would be a parabola through the last two states and the end of the next step.
         """
         self._last_step = 0.0
         self._refreshed = None
@@ -136,9 +136,9 @@ class PastStates:
         """Add the present state of the forms to the past states, and drop states without effect on the stress.
 
         Args:
-            x: unknowns of the state, locally owned entries.
-            control: load parameter (control) of the state, dimensionless.
-            start: state at the start of the step, or None.
+            x: not used.
+            control: load parameter (control) of the state, dimensionless; it gives the time.
+            start: not used.
         """
         (C, step, _), variables = self._present(), self._stored
         states = [*variables.states, PastState(variables.states[-1].reduced_time + step, C)]
@@ -161,9 +161,9 @@ class PastStates:
 
         Args:
             source: past states on the other mesh.
-            variables: history variables there.
-            x: unknowns of this problem, locally owned entries.
-            control: load parameter (control) of the state, dimensionless.
+            variables: history variables of `source`, from `get`.
+            x: not used.
+            control: not used.
             mapping: function from reference points of the other mesh, shape (n, coordinates), to reference points of
                 this mesh.
 
@@ -194,8 +194,8 @@ class PastStates:
         Args:
             states: K past states, the last of them the present one.
             C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C at n points, shape (4, n).
-            smallest_h: smallest value that the damping h of each state has had since then, shape (K, n); h is the
-                factor of its stress. None: h is not bounded.
+            smallest_h: smallest damping h that has applied to each state so far, an upper bound of the present h, shape
+                (K, n). None: no bound.
         """
         if len(states) < 5:
             return list(range(len(states)))
@@ -222,10 +222,11 @@ class PastStates:
         return [*chosen, len(states) - 1]
 
     def _present(self) -> tuple[np.ndarray, Any, Any]:
-        """Return present values: entries 11, 22, 12, 33 of Cbar, shape (4, n), reduced time since the last state, rate.
+        """Return the present Cbar = J^(-2/3) C, and the reduced time since the last accepted state.
 
-        The rate is the reduced time per process time. Both are numbers, or have shape (n,) if the reduced time depends
-        on the temperature.
+        Returns:
+            Entries 11, 22, 12, 33 of Cbar, shape (4, n). Reduced time since the last accepted state. Reduced time per
+            process time. Both are numbers, or have the shape (n,) if the reduced time depends on the temperature.
         """
         step: Any = self._forms.time_now - self._stored.time
         rate: Any = 1.0
@@ -242,7 +243,7 @@ class PastStates:
         return self._terms.material
 
     def smallest_stretch(self) -> tuple[float, np.ndarray]:
-        """Return the smallest principal stretch of the present fields; collective.
+        """Return the smallest principal isochoric stretch at the quadrature points in the present state; collective.
 
         Returns:
             The stretch; reference position of its point, shape (coordinates,), length.

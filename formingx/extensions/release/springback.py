@@ -39,7 +39,7 @@ class Springback(KeyNumbers):
         path: the run from the part in its tools to the released part (`Path`).
         before: `Wall` of the part in its tools.
         after: `Wall` of the released part.
-        trim_radius: radius of the cut end of the middle line, in the tools, length.
+        trim_radius: radius r of the cut before the release, or of the rim of a part that is not cut, length.
         units: units of the labels.
     """
 
@@ -128,12 +128,14 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
         path: the path of a solid.
         temperature: temperature of both faces of the part after the release, only for a scene with `heat=Cooling(...)`.
             It acts through a conductance of 1e4 conductivity/wall.
-        trim: end of the part, as in `Path.part`; the part is cut along the nearest line of nodes.
-        boundaries: laws of the faces in place of a temperature, as for `Cooling`; they need a duration.
+        trim: radius r, or ("height", h), at which the part ends, length; None: not cut. The part is cut along the
+            nearest line of nodes.
+        boundaries: list of laws of the faces such as `Convection`, or {boundary: temperature}, in place of
+            `temperature`. They need a duration.
         duration: time of cooling or relaxation after the release; default wall^2/diffusivity with a temperature, else
             0.
         state: state of the part in its tools; default the last.
-        accuracy: accuracy of the run, see `Process.run`.
+        accuracy: accuracy in time as in `Process.run`: its name, such as "standard", or the relative error of a step.
         units: a `formingx.Units`, for the labels.
 
     Returns:
@@ -171,7 +173,7 @@ def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, 
         x: unknowns of the part in its tools, locally owned entries.
         cooling_time: duration after the release; 0: none.
         accuracy: relative error of a step in time.
-        trimmed: radius of the cut end, length.
+        trimmed: radius r of the end of the part before the release, length.
         units: units of the labels.
     """
     stages = [Stage("release"), *([Stage("cool", duration=cooling_time)] if cooling_time else [])]
@@ -194,9 +196,9 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
     Args:
         scene: the scene of the part in its tools.
         mesh: mesh of the part.
-        temperature: as for `springback`.
-        boundaries: as for `springback`.
-        duration: as for `springback`.
+        temperature: temperature of both faces after the release, or None.
+        boundaries: list of laws of the faces or {boundary: temperature}, or None.
+        duration: time of cooling or relaxation after the release, or None for the default.
         wall: `Wall` of the part in its tools.
 
     Raises:
@@ -227,7 +229,7 @@ def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
     Args:
         scene: the scene of the part in its tools.
         mesh: mesh of the part.
-        heat: `Cooling` of the part, or None.
+        heat: `Cooling` of the part after the release, or None.
     """
     symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
     supports: list[Support] = [*symmetries]
@@ -248,7 +250,7 @@ class _FixedComponent(PinnedNode):
     """Constraint of one displacement component of a node against rigid motion; a free body exerts no force on it.
 
     Args:
-        component: number of the component.
+        component: 0 for the radial displacement, 1 for the axial one.
         point: reference position of the node, shape (2,), length.
     """
 
@@ -261,7 +263,7 @@ class _FixedComponent(PinnedNode):
 
 
 def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
-    """Return the mesh up to the line of nodes nearest to a trim, and the deformed radius of this end, length.
+    """Return the mesh of a part up to the line of nodes nearest to a trim, and the deformed radius of this line.
 
     Args:
         mesh: the mesh of the whole body.
@@ -280,7 +282,7 @@ def _transferred_unknowns(source: Any, state: Any, problem: Problem) -> np.ndarr
     Args:
         source: the problem of the whole body.
         state: the state of the whole body.
-        problem: the problem of the part, whose fields are set.
+        problem: the problem of the part; its fields are set to these unknowns.
 
     Returns:
         Unknowns of `problem`, locally owned entries.

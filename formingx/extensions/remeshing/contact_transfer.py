@@ -143,5 +143,13 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
 
 
 def _interpolated(values: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Interpolate between the two values of each pair, shape (n, 2, ...); share: 0 at the first, 1 at the second."""
+    """Interpolate linearly between the two values of each of n pairs.
+
+    Args:
+        values: values of the pairs, shape (n, 2) or (n, 2, k).
+        share: positions between the first value (0) and the second (1), shape (n,) or (n, 1).
+
+    Returns:
+        Interpolated values, shape (n,) or (n, k).
+    """
     return values[:, 0] + share * (values[:, 1] - values[:, 0])

@@ -44,7 +44,7 @@ class MaterialPointProbe(Probe):
 
 
 def original_positions(state_transfer: Any, points: np.ndarray) -> np.ndarray:
-    """Return the positions on the first mesh of points of a new mesh.
+    """Map points of a new mesh back to their positions on the first mesh of the run.
 
     They are interpolated from the nodes of the old mesh, in the deformed body.
 
@@ -87,7 +87,7 @@ def scene_on_new_mesh(mesh: Any, state_transfer: Any) -> Any:
 
 
 def followed(problem: Any, points: np.ndarray) -> np.ndarray:
-    """Return the positions of points of the first mesh on the mesh of a problem.
+    """Map points of the first mesh of a run to their positions on the mesh of a problem.
 
     Args:
         problem: the `Problem`.
@@ -137,5 +137,12 @@ class _OutlineProjection:
 
 
 def _points_on_edges(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return points of parabolic edges from a to b through `middle`, shape (n, 2), at parameters s from 0 to 1."""
+    """Return one point on each of n parabolic edges, shape (n, 2), length.
+
+    Args:
+        a: first ends of the edges, shape (n, 2), length.
+        b: second ends, shape (n, 2), length.
+        middle: midpoints, shape (n, 2), length.
+        s: parameters of the points, 0 at a and 1 at b, shape (n, 1).
+    """
     return (1 - s) * (1 - 2 * s) * a + s * (2 * s - 1) * b + 4 * s * (1 - s) * middle

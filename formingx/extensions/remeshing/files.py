@@ -16,7 +16,7 @@ from .earlier_meshes import scene_on_new_mesh
 
 
 def save(problem: Any) -> dict[str, Any]:
-    """Return the data of a problem on a mesh that was made during the run, as plain data for `load`; on one rank.
+    """Return data for a checkpoint, from which `load` makes a problem on a mesh of a remeshed run; on one rank.
 
     Nodes and cells keep the order in which the mesh was made.
 
@@ -24,7 +24,7 @@ def save(problem: Any) -> dict[str, Any]:
         problem: the `Problem`.
 
     Returns:
-        Data of the mesh, the transferred deformation and the contacts.
+        Dictionary of numbers, text and arrays: mesh, transferred deformation, offsets of contact distances.
     """
     mesh = problem.scene.mesh
     grid, nodes = gathered(mesh), np.asarray(mesh.domain.geometry.input_global_indices, dtype=np.int64)

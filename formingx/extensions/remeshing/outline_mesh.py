@@ -30,9 +30,10 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
         layer: name of the only layer.
         axisymmetric: True for a body of revolution.
         comm: MPI communicator.
-        volume: volume of revolution (or area) of the new mesh, to which R is scaled; default: that inside the outline.
-        outside: function of new outline points, shape (n, 2), length, and the names of their boundaries; it returns the
-            points moved out of the tools.
+        volume: volume of revolution, or area in plane strain, which the mesh gets by a scaling of R; default: the
+            volume inside the outline.
+        outside: function of new outline points, shape (n, 2), length, and the names of the boundaries that all of them
+            belong to. It returns the points moved out of the tools.
 
     Returns:
         The mesh.

@@ -73,8 +73,8 @@ class Remesh(RunExtension):
     Args:
         size: edge length of the elements on the deformed body, length.
         corner: edge length where faces under tools meet and where contact ends, length; default a third of `size`.
-        volume_ratio: (smallest, largest) allowed volume ratio J at the quadrature points, for an incompressible
-            material. Otherwise the body is remeshed.
+        volume_ratio: (smallest, largest) volume ratio J since the mesh was made, at the quadrature points. Outside this
+            range the body is remeshed. J of an incompressible material is 1 on a good mesh.
 
     Raises:
         InputError: a size that is not positive, `corner` above `size`, or a range without 1.
@@ -153,13 +153,13 @@ def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
 
 def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
                         done: Callable[[], bool]) -> None:
-    """Run to the end of a path on as many meshes as needed.
+    """Continue a run to its end, with a new mesh whenever the elements are too distorted.
 
     Args:
         path: the path, extended in place.
         remesh: criterion and sizes.
         tolerances: tolerances of the states.
-        part: function that continues the run from the last state on its mesh.
+        part: function that continues the run on the last mesh, to its end or until a new mesh is needed.
         done: function that returns True if the path is complete.
 
     Raises:
@@ -197,7 +197,7 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
 
 
 def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
-    """Remesh the last body of a path, and add the first state on the new mesh with the earlier step length.
+    """Remesh the body in the last state of a path, and add the first state on the new mesh to it, in equilibrium.
 
     Args:
         path: the path, extended in place.
@@ -265,7 +265,7 @@ def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segme
 
 
 def _volume_ratios(record: Record, state: State) -> tuple[float, float]:
-    """Return the smallest and the largest volume ratio J at the quadrature points in a state."""
+    """Return the smallest and largest volume ratio J since the mesh was made, at the quadrature points in a state."""
     with record.problem.state_context(state) as problem:
         return problem.admissible.volume_ratios()
 
@@ -294,7 +294,7 @@ def _check_mesh(record: Record, state: State, remesh: Remesh) -> None:
 
 
 def _needs_remeshing(record: Record, state: State, remesh: Remesh) -> bool:
-    """Return True if the volume ratio J leaves `Remesh.volume_ratio` in a state that is not the first on its mesh."""
+    """Return True if J since the mesh was made leaves `Remesh.volume_ratio` in a state after the first on this mesh."""
     if state.kind in ("start", "remesh"):
         return False
     low, high = _volume_ratios(record, state)
@@ -409,13 +409,13 @@ def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np
 
 def _moved_out_of_tools(x: np.ndarray, names: frozenset[str],
                         contacts: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
-    """Return new outline points moved out of the tools, to the depth of neighbouring contact points.
+    """Return new outline points moved out of the tools, to the penetration depth of the old contact points beside them.
 
     New edges cut corners of the old outline, so points on them may lie in a tool.
 
     Args:
-        x: points, shape (n, 2), length.
-        names: names of their boundaries.
+        x: positions of the new points, shape (n, 2), length.
+        names: names of the boundaries that all of these points belong to.
         contacts: (contact on the old mesh, contact state, travel of the tool, shape (2,), length) of each contact.
     """
     for contact, before, travel in contacts:

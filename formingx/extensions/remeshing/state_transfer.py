@@ -92,7 +92,7 @@ class StateTransfer(NamedTuple):
         return cls(x, reference, b, pressures, stiffness, (problem, state))
 
     def followed(self, problem: Any, points: np.ndarray) -> np.ndarray:
-        """Return the positions of points of the first mesh on the new mesh.
+        """Map points of the first mesh of the run to their positions on the new mesh.
 
         Args:
             problem: the `Problem` on the new mesh.
@@ -127,7 +127,7 @@ class StateTransfer(NamedTuple):
         return save(problem)
 
     def original_positions(self, points: np.ndarray) -> np.ndarray:
-        """Return the positions of points of the new mesh on the first mesh.
+        """Map points of the new mesh back to their positions on the first mesh of the run.
 
         Args:
             points: positions on the new mesh, shape (n, 2), length.
@@ -231,10 +231,16 @@ class StateTransfer(NamedTuple):
         return np.concatenate([b / J, turn / np.linalg.norm(turn, axis=0)]).T, J
 
     def _find_cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the old cells of points of the deformed body, shape (n,), and their local coordinates, shape (n, 2).
+        """Find the cells of the deformed old mesh in which n points lie.
 
-        Newton's method is used in the cells nearby. New edges cut corners of old ones: a point outside the body is
-        placed on the edge of the nearest element.
+        Newton's method is used in the cells nearest to a point. New edges cut corners of old ones: a point outside the
+        body is placed on the edge of the nearest element.
+
+        Args:
+            points: positions of the points in the deformed body, shape (n, 2), length.
+
+        Returns:
+            Numbers of the cells, shape (n,); local coordinates of the points in them, shape (n, 2).
         """
         from scipy.spatial import cKDTree
         inside = 0.9 * _LATTICE + 0.1 / 3

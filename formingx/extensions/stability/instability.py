@@ -253,11 +253,11 @@ class StabilityAnalysis:
         return Stability(self._path, numbers, chosen, counts, critical_points)
 
     def _locate(self, a: State, b: State, kind: ModeClass, unstable_modes: Any) -> list[CriticalPoint]:
-        """Return the critical points of modes of one kind between two states, located between neighbours of the path.
+        """Return the critical points of one kind of modes between two states, each located between neighbouring states.
 
         Args:
             a: the first state.
-            b: the second state.
+            b: a later state of the path.
             kind: wave number and symmetry of the modes.
             unstable_modes: function of state and kind that returns the number of unstable modes.
         """
@@ -280,7 +280,7 @@ class StabilityAnalysis:
         return [self._critical_point(segment, entry, limit) for entry, limit in zip(found, limits, strict=True)]
 
     def _is_limit_point(self, segment: Any, found: LocatedPoint) -> bool:
-        """Return True if a point is a limit point: if its mode is nearly parallel to the tangent of the path.
+        """Return True if the mode of a located point is nearly parallel to the path tangent, as at a limit point.
 
         segment: the `Segment`, the part of the path on one mesh.
         """
@@ -325,7 +325,7 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
         states: number of states, evenly spaced on the path; "all"; or a list of states of the path.
 
     Returns:
-        Counts of unstable modes and critical points; prints a table.
+        Counts of unstable modes and critical points; `print` shows them as a table.
 
     Raises:
         InputError: a membrane, an elastic support, or a load without a second variation.
@@ -336,7 +336,7 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
 
 
 class InstabilityCondition(RunExtension):
-    """Stopping condition of a run: a mode becomes unstable that was stable at the first state; see `instability`.
+    """Stopping condition of a run: more modes are unstable than at the first state; see `instability`.
 
     Args:
         modes: wave numbers: n round the axis; in plane strain k along the depth, 1/length.
@@ -372,10 +372,10 @@ class InstabilityCondition(RunExtension):
 
 
 def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
-    """Return a stopping condition for `trace(stop_at=...)`: a mode is unstable that was stable at the first state.
+    """Return a condition for `trace(stop_at=...)` that ends a run when more modes are unstable than at its first state.
 
-    It costs about two iterations per mode and state. `Path.ended` names the mode, `Path.stability` locates the critical
-    point.
+    It costs about two iterations per mode and state. A limit point does not end the run. `Path.ended` names the mode,
+    and is "" if there is none. `Path.stability` locates the critical point.
 
     Args:
         modes: circumferential wave numbers; in plane strain wave numbers along the depth, 1/length.

@@ -27,8 +27,8 @@ class LanczosSettings:
     Attributes:
         steps: maximum number of steps, each a solve with the stored LU factors.
         tolerance: relative error of an eigenvalue at which the iteration ends.
-        round_off: norm of a new Lanczos vector after orthogonalisation, over the largest eigenvalue of K^-1 M. A
-            smaller vector is round-off: all modes have been found.
+        round_off: norm of a new Lanczos vector after orthogonalisation, over the largest eigenvalue of K^-1 M
+            with the lumped mass matrix M. A smaller vector is round-off: all modes have been found.
     """
 
     steps: int = 80
@@ -43,9 +43,9 @@ class LocationSettings:
     Attributes:
         states: maximum number of states to solve for.
         tolerance: tolerance of the position of the point, relative to the distance of the two states.
-        offset: distance on either side of the point at which the number of unstable modes is counted, relative as
-            above.
-        patience: number of steps without halving of the bracket after which it is bisected.
+        offset: distance on either side of the point at which the number of unstable modes is counted, relative to the
+            distance of the two states.
+        patience: number of steps in which the bracket is not halved, after which it is bisected.
         min_overlap: scalar product of two normalised modes above which they are the same mode.
         max_deviation: largest distance of a state from the cubic between the two states, over their distance. A state
             further away lies on another branch.

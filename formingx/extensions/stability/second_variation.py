@@ -147,7 +147,7 @@ class SecondVariation:
         return out
 
     def amplitudes(self, x: np.ndarray) -> np.ndarray:
-        """Return the amplitudes (U, W, V) of the radial, axial and hoop displacement of a mode at `nodes`.
+        """Return the radial, axial and hoop displacement amplitudes (U, W, V) of a mode at the m locally owned nodes.
 
         Args:
             x: mode, locally owned entries, shape (n,).
@@ -221,7 +221,7 @@ class SecondVariation:
             self.matrix.zeroRowsColumns(rows if self.comm.rank == 0 else [], 1.0)
 
     def _sum(self, values: np.ndarray) -> float:
-        """Return the sum of the entries of an array on all ranks."""
+        """Return the sum of the locally owned entries `values`, shape (n,), over all ranks."""
         return float(self.comm.allreduce(values.sum()))
 
     def _form(self) -> Any:
@@ -359,7 +359,7 @@ class SecondVariation:
         return np.flatnonzero(marks).astype(np.int32)
 
     def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Yield the row of each constraint of a mean displacement of modes, and what it becomes for one wave.
+        """Yield the row of each constraint of a mean displacement, and the row to be subtracted from it for one wave.
 
         A support that constrains the mean radial and axial displacement also constrains the mean hoop displacement V.
         The third unknown is V, but V + U for modes of one wave round the axis, with the radial displacement U. For one

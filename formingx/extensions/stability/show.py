@@ -59,7 +59,8 @@ def _draw(point: Any, lines: list, file: Any, scale: float) -> None:
 
     Args:
         point: the `CriticalPoint` with the mode.
-        lines: result of `_outline`.
+        lines: (deformed positions, amplitudes U, W, V of the mode) at the m points of each boundary, shape (m, 2),
+            length, and shape (m, 3), dimensionless.
         file: path of the PNG file.
         scale: largest displacement of the mode over the size of the body.
     """

@@ -76,7 +76,7 @@ class TopLoad:
         return self.stability.first
 
     def first_of(self, number: float) -> CriticalPoint | None:
-        """Return the first critical point at which a mode with a number of waves buckles.
+        """Return the first critical point at which a mode with a given number of waves buckles.
 
         Args:
             number: number of waves round the axis.
@@ -87,13 +87,13 @@ class TopLoad:
         return self.stability.first_of(number)
 
     def buckling(self, number: float) -> tuple[float, float] | None:
-        """Return the force on the pressed neck and its travel at which the body first buckles with a number of waves.
+        """Return the force on the neck and its travel at which the body first buckles with a given number of waves.
 
         Args:
             number: number of waves round the axis.
 
         Returns:
-            Total force, force; travel, length, positive downwards. None if the body does not buckle so.
+            Total force, force; travel, length, positive downwards. None if no such mode buckles.
         """
         point = self.first_of(number)
         return None if point is None else (point.state.measures["support_force"], -point.control)
@@ -139,9 +139,9 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     """Press a stress-free body down onto a frictionless plate by its neck, and find its buckling loads.
 
     The neck is constrained radially and round the axis. The plate is compliant: a traction p sinks the foot by
-    p h/(2 mu). Here mu is the shear modulus and h the depth of the body behind the foot, the wall for the foot `outer`
-    of a parison. So the contact of the standing ring of a bottle rolls along the plate. On a rigid plate it would hop
-    from point to point.
+    p h/(2 mu), with the shear modulus mu and the depth h of the body behind the foot. For the foot `outer` of a parison
+    h is the wall thickness. On this plate the contact of a standing ring rolls. On a rigid plate it would hop from
+    point to point.
 
     Args:
         body: mesh of the body, for example `Path.deformed_mesh()`.
