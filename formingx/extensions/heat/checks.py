@@ -110,7 +110,7 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
     """Find equilibrium moduli that increase on cooling: the stress of the stretched part then increases, too.
 
-    Such a part springs back, while a material that solidifies keeps its shape. For example, a film whose equilibrium
+    Such a part springs back, while a part that solidifies keeps its shape. For example, a film whose equilibrium
     modulus was a table of the temperature separated from its mould, and shrank to a third of its height.
 
     Args:

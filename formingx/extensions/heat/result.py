@@ -217,7 +217,7 @@ class HeatRun:
         return self._extreme(self._state_at(time)[0], -1)
 
     def time_to_reach(self, low: float, high: float) -> Window:
-        """Return the times at which the whole body has entered a range of temperatures, and leaves it again.
+        """Return the times at which the whole body has entered a range of temperatures, and a part of it leaves again.
 
         Args:
             low: lower bound of the range, in the unit of the run.
@@ -379,7 +379,12 @@ class HeatRun:
         return [sum(w * v for w, v in zip(weights, parts)) for parts in zip(*self.states[i - 1: i + 2])]
 
     def _extreme(self, T: np.ndarray, sign: int) -> Spot:
-        """Return the node of the largest (sign 1) or smallest (sign -1) nodal temperature T, over all ranks."""
+        """Return the node with the largest or smallest temperature on all ranks.
+
+        Args:
+            T: temperatures of the nodes of this rank, shape (n,).
+            sign: 1 for the largest temperature, -1 for the smallest.
+        """
         k = int(np.argmax(sign * T)) if len(T) else -1
         mine = (sign * T[k], *self._body.points[k].tolist()) if len(T) else (-np.inf, 0.0, 0.0)
         value, R, Z = max(self._comm.allgather(mine))

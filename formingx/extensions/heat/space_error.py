@@ -56,10 +56,11 @@ class SpaceError:
         self._finer.destroy()
 
     def _face_temperatures(self, touch: HeatContact, finer: HeatContact, excess: np.ndarray) -> np.ndarray:
-        """Return the excess temperatures of a tool over its back, for the contact nodes of cubic elements, degrees.
+        """Return the excess temperatures of a tool over its back, below the k contact nodes of cubic elements, degrees.
 
-        Column 0 is the face of the tool, interpolated from the contact nodes of the quadratic elements. The other m - 1
-        columns belong to nodes at a depth in the tool. They are 0, because they have no effect on the body.
+        The shape is (k, m). Column 0 is the face of the tool, interpolated from the contact nodes of the quadratic
+        elements. The other m - 1 columns belong to nodes at a depth in the tool. They are 0, because they have no
+        effect on the body.
 
         Args:
             touch: contact with the tool, of the quadratic elements.

@@ -33,7 +33,7 @@ from .part import trimmed_mesh
 
 @dataclass(frozen=True, repr=False)
 class Springback(KeyNumbers):
-    """Shape of a part in its tools and after its release; prints a table.
+    """Shape of a part in its tools and after its release; `print` shows a table.
 
     Attributes:
         path: the run from the part in its tools to the released part (`Path`).

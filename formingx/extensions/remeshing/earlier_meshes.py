@@ -39,7 +39,7 @@ class MaterialPointProbe(Probe):
         self.points, self.earlier_displacement = first, self.points - first
 
     def _read(self) -> np.ndarray:
-        """Return the displacement of the points since the start of the run, shape (n, 2), length."""
+        """Return the displacements of the n material points since the start of the run, shape (n, 2), length."""
         return super()._read() + self.earlier_displacement
 
 

@@ -43,7 +43,7 @@ def load(before: tuple[Problem, State], data: dict[str, Any], state_transfer: Ca
     """Return the problem on a mesh that was made during a run, from its stored data.
 
     Args:
-        before: the problem on the mesh before, and the last state on it.
+        before: the problem on the previous mesh, and the last state on it.
         data: result of `save`.
         state_transfer: the class `StateTransfer`, called with the stored fields.
 

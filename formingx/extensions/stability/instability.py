@@ -132,7 +132,7 @@ class CriticalPoint:
 
 
 class Stability:
-    """Stability of the examined states of a path, created by `Path.stability`; prints a table.
+    """Stability of the examined states of a path, created by `Path.stability`; `print` shows a table.
 
     Attributes:
         path: the computed `Path`.
@@ -400,7 +400,7 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
         List of wave numbers.
 
     Raises:
-        InputError: a negative or fractional number of waves, or waves shorter than the edges of the elements.
+        InputError: none, a negative or fractional number of waves, or waves shorter than the edges of the elements.
     """
     try:
         numbers = [finite("stability: modes", n) for n in modes]

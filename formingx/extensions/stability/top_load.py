@@ -37,7 +37,7 @@ _LARGEST_STEP = 0.004
 
 @dataclass(eq=False, repr=False)
 class TopLoad:
-    """Force and buckling of a body that is pressed down onto a plate by its neck; prints a table.
+    """Force and buckling of a body that is pressed down onto a plate by its neck; `print` shows a table.
 
     Attributes:
         path: the axisymmetric path.
