@@ -219,8 +219,8 @@ class Design:
         """Search for the smallest reference volume whose wall thickness is nowhere below a minimum.
 
         Successive linear programs minimise the linearised volume within a trust region, which shrinks if a run is worse
-        (Palacios-Gomez, Lasdon and Engquist 1982). The wall at every node is a separate linear constraint. So no
-        derivative is needed where the thinnest node changes and the minimum wall is not differentiable.
+        (Palacios-Gomez, Lasdon and Engquist 1982). The wall at every node is a separate linear constraint. So the
+        method needs no derivative of the minimum wall, which is not differentiable where the thinnest node changes.
 
         Args:
             min_wall: minimum wall thickness, length.

@@ -77,7 +77,8 @@ class PerturbedRun:
         control: load parameter (control) of the state, dimensionless.
         history_variables: history variables of the state.
         plans: `Plan` of each stage, in which loads, supports and contacts are indices into `Scene.items`.
-        piece_end: process time at which the present piece of a stage in time ends, at a knot of its amplitudes.
+        piece_end: process time at which the present piece of a stage in time ends: at a knot of an amplitude, or at the
+            end of the stage.
 
     Raises:
         InputError: the elements of the mesh, or the number of items or unknowns, differ from the base run.

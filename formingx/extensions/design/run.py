@@ -140,10 +140,10 @@ class DesignRun:
 
     @cached_property
     def _perturbed_runs(self) -> list[tuple[list[PerturbedRun], float]]:
-        """For each parameter, its perturbed runs at their last state, and the parameter's difference for a quotient.
+        """For each parameter: the perturbed runs, in their last state, and the denominator of the difference quotient.
 
-        Without contact there are two runs, at the parameter's value plus and minus a step; the difference is two steps.
-        With contact there is one; the difference is its value of the parameter minus the value in this run.
+        Without contact there are two runs, at the parameter's value plus and minus a step; the denominator is two
+        steps. With contact there is one run; the denominator is its value of the parameter minus the value in this run.
 
         Raises:
             InputError: the run has no derivative.

@@ -24,8 +24,8 @@ from .tested import MeasuredRange, nearest_test, principal_strains
 def expected_stretches_beyond_tests(body: Any) -> Iterator[Finding]:
     """Find constants that tests of a single mode leave undetermined, and expected stretches beyond the tests.
 
-    For each target of the run, the expected stretch is the largest one of a free dome. In a closed mould it is the root
-    of the areal draw ratio.
+    For each target of the run, the expected stretch is the largest one of a free dome. In a closed mould it is the
+    square root of the areal draw ratio.
 
     Args:
         body: the examined `formingx.checks.sizes.Body`, before its run.

@@ -244,8 +244,8 @@ def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tup
         n: number of branches.
 
     Returns:
-        The fitted material, with its branches in ascending order of relaxation time; root mean square of the scaled
-        misfits.
+        The fitted material, with its branches in ascending order of relaxation time; root mean square of the misfits,
+        each divided by its size (`data.sizes`).
 
     Raises:
         InputError: fewer points than constants, or no finite stress at some stretch of the tests.

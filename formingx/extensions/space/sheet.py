@@ -163,7 +163,7 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
 
     Raises:
         InputError: an outline that intersects itself, a size that is not positive, or more than 500,000 triangles. Also
-            a reflected boundary that is not straight, or if the sheet crosses or touches its straight line elsewhere.
+            a reflected boundary that is not straight, or whose straight extension crosses or touches the sheet.
 
     >>> quarter = fx.mesh.rectangle(300, 200, corner=20, part="quarter")
     >>> print(fx.mesh.sheet(quarter, size=40))
@@ -269,9 +269,9 @@ class _Size:
             return 1e22
 
     def area_and_size(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the area and the edge length of triangles of m equal pieces of a polygon, shape (m,) each.
+        """Divide a polygon into m pieces; return their areas and the edge lengths of triangles there, shape (m,) each.
 
-        A constant edge length needs one piece.
+        All pieces have the same area. With a constant edge length there is one piece.
 
         Args:
             x: corners of the polygon, shape (n, 2), length.
@@ -349,7 +349,7 @@ def _reflected(grid: Grid, name: str) -> Grid:
         name: name of the boundary, which the result does not have.
 
     Raises:
-        InputError: the boundary is not straight, or the sheet crosses or touches its straight line elsewhere.
+        InputError: the boundary is not straight, or its straight extension crosses or touches the sheet.
     """
     X, (sheet,) = grid.points, grid.layers.values()
     line = np.unique(grid.boundaries[name])

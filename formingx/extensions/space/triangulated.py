@@ -64,7 +64,7 @@ class Triangulated(SolidTool):
     def undercuts(self, along: tuple[float, float, float] = (0, 0, 1)) -> dict[str, float]:
         """Compute the undercut area and the smallest draft of a mould for a direction of demoulding.
 
-        Only triangles inside the convex hull of the tool count, the surface of its cavity. Triangles inside another
+        Only the triangles of the cavity count, which lie inside the convex hull of the tool. Triangles inside another
         body of the tool do not count.
 
         Args:
