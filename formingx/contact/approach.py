@@ -173,9 +173,9 @@ class Approach:
             arc_lengths: arc lengths at which gaps close, shape (n,); `length` for gaps that stay open.
             places: positions of the points at these arc lengths, relative to the tool, shape (n, c), length.
             length: arc length of the step (dimensionless).
-            ends: True if `StepLimit.check` will shorten the step to a gap closure whose point slips too far, or against
-                its friction, afterwards. A sticking point whose gap closes near the end of the step then carries no
-                friction before the next step, unless its predicted slip is too large.
+            ends: True if `StepLimit.check` may shorten the step to one of its gap closures. A sticking point whose gap
+                closes near the end of the step (`StepLimits.friction_fraction`) then carries friction in the next step
+                only. It carries friction at once if its predicted slip is too large (`StepLimits.max_slip_ratio`).
             guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
             speeds: derivatives of the positions by arc length just before the predicted closures, shape (n, c), length;
                 None: unknown.
@@ -256,10 +256,10 @@ class Approach:
         return True
 
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Replace the stored contact pressure, of the last accepted state, by the pressure of a state at a target.
+        """Replace the contact pressure stored at the last accepted state by the pressure of a state at a target.
 
-        The stored pressure bounds lagged friction. Where a sheet slides, the tangential part of a fluid pressure also
-        decreases with the stored contact pressure.
+        On tools in three dimensions the stored pressure bounds the friction of a step. Where a sheet slides, the
+        tangential part of a fluid pressure also decreases with the stored pressure.
 
         Args:
             new: locally owned unknowns of the state, which meets a target of the run, shape (n,).
@@ -267,7 +267,7 @@ class Approach:
 
         Returns:
             True if the pressure was replaced. False if both agree to `StepLimits.max_target_difference` in the
-            area-weighted 1-norm, or no pressure is lagged.
+            area-weighted 1-norm, or if no pressure is stored for friction.
         """
         face, law, variables = self.face, self.face.law, self.face.get()
         if variables is None or not face.contact.lagged or face.contact.sticks:
@@ -283,9 +283,10 @@ class Approach:
         return True
 
     def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """Return the arc length of a step in which the contact pressure changes by `StepLimits.max_pressure_change`.
+        """Return the arc length after which the contact pressure has changed by a given fraction.
 
-        The pressure that bounds lagged friction is extrapolated linearly.
+        The fraction is `StepLimits.max_pressure_change`. The pressure is extrapolated linearly from the last accepted
+        state. Lagged friction is bounded by the pressure at that state.
 
         Args:
             start: positions of the points relative to the tool, shape (n, c), length.
@@ -354,7 +355,8 @@ class Approach:
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            True if a path cuts the tool deeper than allowed, see `cuts_tool`.
+            True if the depth on a path exceeds the larger depth of its ends by more than `StepLimits.max_cut_ratio`
+            times the tributary length of the point.
         """
         return self.cuts_tool(self.face.positions(old, old_control), self.face.positions(new, control))
 
@@ -385,12 +387,12 @@ class Approach:
 
     def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
                                length: float) -> float:
-        """Return the fraction of a step at which the first gap closes whose point then slips in a wrong way.
+        """Return the fraction of a step at which the first gap closes whose point then slips wrongly.
 
-        There are two wrong ways. A sticking point without a predicted gap closure carries no friction in the step, but
-        moved along the tool by more than `StepLimits.max_slip_ratio`. A point with Coulomb friction slides at the end
-        against the slip since its gap closure. Pressure and slip are assumed to grow from the gap closure on, at their
-        rates at the end of the step, along (direction, slope).
+        A sticking point slips wrongly if it carries no friction in the step, but moves along the tool after its gap
+        closure. `StepLimits.max_slip_ratio` limits this motion. A point with Coulomb friction slips wrongly if it
+        slides, at the end of the step, against its slip since the gap closure. Pressure and slip are assumed to grow
+        linearly from the gap closure, with their rates along (direction, slope).
 
         Args:
             new: locally owned unknowns at the end of the step, shape (n,).

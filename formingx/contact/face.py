@@ -28,7 +28,7 @@ class FaceContact:
     Args:
         solid: the scene's formulation, such as `Solid`.
         contact: the `Contact`.
-        assemble: function that returns the locally owned entries of a linear form.
+        assemble: function that assembles a compiled linear form and returns its locally owned entries.
 
     Attributes:
         rule: quadrature rule, with the contact points (`Rule`).
@@ -38,8 +38,9 @@ class FaceContact:
         increment: the current `Increment`.
         active: True if the contact is active in the stage.
         shift: reduction of the signed distances from the tool after a remeshing, shape (n,), length; else None.
-        unbalanced: resultant of contact forces minus nodal forces of the body, due to round-off of positions, shape
-            (components,), stress length^2. Perturbed runs of a design sensitivity set it; `force` subtracts it.
+        unbalanced: sum of the residual at the points in contact, as a force, shape (components,), stress length^2. The
+            resultant `force` is reduced by it, so that it balances the internal forces of the body. It is 0 except in
+            the perturbed runs of a design sensitivity, whose changes of the gaps are below round-off.
     """
 
     def __init__(self, solid: Any, contact: Contact, assemble: Any):
@@ -74,7 +75,10 @@ class FaceContact:
         self._base, self._rate, self.active = base, rate, active
 
     def shift_distances(self, shift: np.ndarray) -> None:
-        """Reduce the signed distances of the points from the tool by `shift`, shape (n,), length, after remeshing."""
+        """Reduce the signed distances from the tool, positive inside, by `shift`, shape (n,), length.
+
+        After a remeshing, the contact law thus gives the pressures of the old mesh at the new positions.
+        """
         self.shift = shift
         self.law = self._law(self._penalty)
 
@@ -93,16 +97,17 @@ class FaceContact:
             self.increment = Increment(self.law, self.history)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the points in the units of `values`, the locally owned unknowns (`Rule`)."""
+        """Return the displacement of the points, shape (n, components), in the unit of `values`; collective.
+
+        values: locally owned unknowns, shape (m,). With k columns, (m, k), the result is (n, components, k).
+        """
         return self.rule.displacement(values)
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the positions of the points relative to the tool in a state.
 
-        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
-
-        Returns:
-            Reference position plus displacement minus travel of the tool, shape (n, components), length.
+        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless. The
+        result is reference position plus displacement minus travel of the tool, shape (n, components), length.
         """
         return self.points + self._length * self.displacement(fields) - self.tool_displacement(control)
 
@@ -114,8 +119,8 @@ class FaceContact:
         """Return the motion of the points relative to the tool in a change of the state, shape (n, components), length.
 
         Args:
-            dx: change of the locally owned unknowns, shape (m,); several are columns, and the last axis of the result.
-            step: change of the control, a number or shape (k,).
+            dx: change of the locally owned unknowns, shape (m,), or (m, k) for a result of shape (n, components, k).
+            step: change of the control, a number, or shape (k,) with k columns of dx.
         """
         motion = self._length * self.displacement(dx)
         return motion - np.multiply.outer(self._travel_vector, self._rate * step) if self._rate else motion
@@ -143,8 +148,6 @@ class FaceContact:
         if self._stored is None or not self.contact.lagged:
             return self.rule.area
         return np.where(self._stored.newly_closed, 0.0, self.rule.area)
-
-    # equations
 
     @property
     def scale(self) -> np.ndarray:
@@ -195,11 +198,11 @@ class FaceContact:
         self.add(values, force if self._applied is None else np.where(np.isnan(self._applied), force, self._applied))
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
-        """Linearise the contact law for a Newton iteration at a state.
+        """Linearise the contact law for a Newton iteration at a state, and update the residual.
 
         Args:
-            values: locally owned entries of the residual F, in which the contact forces are replaced by the forces of
-                the linearised law.
+            values: locally owned entries of the residual F, shape (m,), changed in place. The forces of the linearised
+                law replace those of the law.
             fields: locally owned unknowns of the state.
             control: load parameter (control) of the state, dimensionless.
         """
@@ -211,8 +214,8 @@ class FaceContact:
         Args:
             fields: locally owned unknowns of the state.
             control: load parameter (control) of the state, dimensionless.
-            one_sided: True for the derivative towards the next step at an accepted state, where just closed points are
-                stiff.
+            one_sided: True for the tangent from which the next step starts. A point whose gap just closed, with a
+                stiffness of 0, then gets the stiffness of deeper contact.
 
         Returns:
             Derivative of the dimensionless nodal forces of each point by its m unknowns (`Rule.dofs`), shape (n, m, m).
@@ -221,13 +224,17 @@ class FaceContact:
         return self._of_unknowns(self._in_tangent)
 
     def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the derivative of the contact forces by the unknowns of each point (`Rule.dofs`), shape (n, m, m)."""
+        """Return the derivative of the dimensionless contact forces by the m unknowns of each point, shape (n, m, m).
+
+        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
+        """
         return self._of_unknowns(self._stiffness(fields, control, False))
 
     def hoop_stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the derivative of circumferential contact forces by circumferential motions of the nodes.
 
-        The shape is (n, k, k) with the k nodes of each point. The second variation of non-axisymmetric modes uses it.
+        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless. The
+        shape is (n, k, k) with the k nodes of each point. The second variation of non-axisymmetric modes uses it.
         """
         radius = np.full(len(self.points), np.inf)
         if self._solid.scene.kinematics.axisymmetric:
@@ -237,10 +244,11 @@ class FaceContact:
         return self._of_unknowns(both)[:, ::2, ::2]
 
     def one_sided_change(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the stiffness at an accepted state towards the next step, minus the stiffness in the last tangent.
+        """Return the one-sided stiffness of the points minus their stiffness in the last tangent.
 
-        Shape (n, components, components), stress/length. It is 0 for points at which no entry of the stiffness changes
-        by more than 1e-3 of the largest entry in the last tangent.
+        From the one-sided stiffness at an accepted state the next step starts: points whose gap just closed have the
+        stiffness of deeper contact. The shape is (n, components, components), stress/length. The result is 0 for points
+        at which no entry changes by more than 1e-3 of the largest entry in the last tangent.
         """
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
@@ -250,8 +258,8 @@ class FaceContact:
                                one_sided: bool = False) -> None:
         """Add the derivative of the contact forces by the control, through the travel of the tool, to `values`.
 
-        values: locally owned entries of dF/dcontrol, changed in place. one_sided: True for the derivative towards the
-        next step, at an accepted state.
+        values: locally owned entries of dF/dcontrol, changed in place. fields, control: locally owned unknowns and
+        load parameter of the state. one_sided: True gives points whose gap just closed the stiffness of deeper contact.
         """
         if self._rate:
             stiffness = self._stiffness(fields, control, one_sided)
@@ -260,8 +268,8 @@ class FaceContact:
     def _stiffness(self, fields: np.ndarray, control: float, one_sided: bool) -> np.ndarray:
         """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length.
 
-        one_sided: True for the derivative towards the next step, at an accepted state, where just closed points are
-        stiff.
+        one_sided: True for the tangent from which the next step starts. A point whose gap just closed, with a stiffness
+        of 0, then gets the stiffness of deeper contact.
         """
         if one_sided:
             newly_closed = self._stored.newly_closed if self._stored else np.zeros(len(self.points), dtype=bool)
@@ -293,8 +301,6 @@ class FaceContact:
         if not np.array_equal(penalty, self._penalty):
             self._penalty, self.law = penalty, self._law(penalty)
 
-    # history
-
     @property
     def has_history(self) -> bool:
         """True if the contact forces depend on history variables."""
@@ -312,7 +318,7 @@ class FaceContact:
     def activate(self, fields: np.ndarray, control: float) -> None:
         """Set the history variables of points without earlier contact, at the state in which the contact is activated.
 
-        fields: locally owned unknowns of the state.
+        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
         """
         self._start_at(self.positions(fields, control))
 
@@ -325,8 +331,8 @@ class FaceContact:
         """Store the predicted positions at which the gaps of the points close in the next step.
 
         Args:
-            closure: positions relative to the tool, shape (n, components), length. From there on friction acts on a
-                point; NaN: no friction acts on it in the step.
+            closure: positions relative to the tool, shape (n, components), length. Friction acts on a point after its
+                gap has closed there; NaN: no friction acts on the point in the step.
             guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
         """
         self._guessed = guessed
@@ -353,7 +359,10 @@ class FaceContact:
         self._set_history(FaceHistory(history, newly_closed, penalty))
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
-        """Open the points under tension at a tool in three dimensions; return True if there are any. Collective."""
+        """Open the points under tension at a tool in three dimensions; return True if there are any. Collective.
+
+        fields, control: locally owned unknowns and load parameter of the state.
+        """
         if self._stored is None or not (self.contact.lagged and self.contact.separates):
             return False
         history, x = self._stored.history, self.positions(fields, control)
@@ -369,7 +378,7 @@ class FaceContact:
         """Close the gaps of open points that are deeper than `most` (length) in a tool in three dimensions; collective.
 
         Each such point sticks or slides from the position where its path in the step met the tool. Return True if
-        there are such points.
+        there are such points. fields, control: locally owned unknowns and load parameter of the state.
         """
         if self._stored is None or not self.contact.lagged:
             return False

@@ -66,7 +66,7 @@ double crossing(const double *x, const double *w, double theta, double shift, do
 def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
     """Return the arc lengths at which open points on straight paths reach their tool: their gaps close.
 
-    Contact begins at the signed distance -theta (positive inside the tool), the outer edge of the contact ramp.
+    Contact begins at the signed distance -theta, positive inside the tool. theta is the half-width of the contact ramp.
 
     Args:
         law: contact law.
@@ -102,7 +102,7 @@ def crossing(law: Any, i: int, x: np.ndarray, velocity: np.ndarray, earliest: fl
              iterations: int) -> float:
     """Return the arc length at which the gap of a point near its tool closes, by Newton's method.
 
-    Contact begins at the signed distance -theta (positive inside the tool), the outer edge of the contact ramp.
+    Contact begins at the signed distance -theta, positive inside the tool. theta is the half-width of the contact ramp.
 
     Args:
         law: contact law.

@@ -26,8 +26,9 @@ class Increment:
         history: history variables of the points; None without friction.
         start: positions of the points relative to the tool at the last accepted state, shape (n, c), length; None
             without such a state.
-        guessed: mask of the points whose contact forces are predicted at the first guess of the iteration, shape (n,).
-            The law is first linearised at the guess for these points, and at the start for the others.
+        guessed: mask of the points whose predicted contact forces belong to the guess of the step, shape (n,). The
+            first iteration linearises the law at the guess for these points. For the others it extrapolates distances
+            and slips from `start`.
     """
 
     def __init__(self, law: ContactLaw, history: ContactHistory | None, start: np.ndarray | None = None,
@@ -110,26 +111,32 @@ class Increment:
         return self._last_result[1].force[points], self._last_result[1].stiffness[points]
 
     def predicted(self, motion: np.ndarray) -> Tractions:
-        """Return the tractions after a further motion of all points, with distances and slips predicted to first order.
+        """Return the linearised law of all points after a further motion.
+
+        The law is linearised at the distances and slips after the motion, as their gradients predict them.
 
         Args:
-            motion: motion of the points relative to the tool since the last computed tractions, shape (n, c), length.
+            motion: motion y of the points relative to the tool since the last computed tractions, shape (n, c), length.
 
         Returns:
-            Tractions of the law, linearised at the predicted distances and slips.
+            Traction f and stiffness S of this linearisation at the position before the motion. The traction after it is
+            f + S y.
         """
         x, predicted = self._last_result[0], self._predicted_motion(slice(None))
         return self._law.tractions(x, self._history, None, predicted(motion))
 
     def law_at(self, points: np.ndarray) -> Callable[[np.ndarray], Tractions]:
-        """Return a function that predicts the tractions at some points after a further motion.
+        """Return a function that gives the linearised law of some points after a further motion.
+
+        The law is linearised at the distances and slips after the motion, as their gradients predict them.
 
         Args:
             points: indices of the points, shape (m,).
 
         Returns:
-            Function of the motion of these points since the last computed tractions, shape (m, c), length. It returns
-            their `Tractions`, linearised at the distances and slips predicted to first order.
+            Function of the motion y of these points since the last computed tractions, shape (m, c), length. It returns
+            `Tractions` with the traction f at the position before the motion and the stiffness S. The traction after
+            the motion is f + S y.
         """
         history = self._history and ContactHistory(*(part[points] for part in self._history))
         law, x, predicted = self._law.part(points), self._last_result[0][points], self._predicted_motion(points)
@@ -160,10 +167,10 @@ class Increment:
         return depth_and_path
 
     def _predicted_motion(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
-        """Return a function that maps the motions of m points since the last tractions, to first order, to a `Motion`.
+        """Return a function that predicts the distances and slips of m points after a motion by their gradients.
 
-        points: indices of the points, shape (m,), or a slice. The motions have the shape (m, c), length. A `Motion` has
-        the distances and slips that the contact law needs.
+        points: indices of the points, shape (m,), or a slice. The function takes the motion of the points since the
+        last computed tractions, shape (m, c), length. It returns a `Motion` with distances, slips and their gradients.
         """
         assert self._before is not None
         before, x = Motion(*(part[points] for part in self._before)), self._last_result[0][points]

@@ -114,9 +114,10 @@ def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:
 def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
     """Return the contact tractions at all points of the face, sorted by the reference coordinate R.
 
-    A traction is the force at a point over its tributary reference area (`Rule.lumped`); the sum of the products is the
-    force. The node on the axis has no tributary area. Its force is added to the middle node of its facet. It gets
-    the pressure of that node and no tangential traction: the pressure is even in R, the tangential traction odd.
+    A traction is the force at a point divided by its tributary reference area (`Rule.lumped`). Tractions times areas
+    add up to the contact force. The node on the axis has no tributary area. Its force is added to the middle node
+    of its facet. It gets the pressure of that node and no tangential traction: the pressure is even in R, the
+    tangential traction odd.
 
     Args:
         face: the contact.

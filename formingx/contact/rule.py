@@ -66,7 +66,8 @@ class Rule(Protocol):
         """Add unit forces at k points, in each component, to columns of the residual; collective.
 
         Args:
-            E: locally owned entries of the residual, a column for each force, changed in place.
+            E: columns with the locally owned entries of the residual, shape (m, k components), changed in place. The
+                forces are ordered by point, then by component.
             points: local numbers of the points, shape (k,); None on a rank that does not own them.
         """
 
@@ -77,7 +78,8 @@ class Rule(Protocol):
             stiffness: derivative of the force at a point by its position, shape (n, components, components).
 
         Returns:
-            Derivative of the nodal forces by the unknowns `dofs`, shape (n, m, m).
+            For each point, derivative of the nodal forces by the m unknowns that move the point (`dofs`), shape (n, m,
+            m).
         """
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
@@ -130,12 +132,13 @@ class _Nodes:
 class Lobatto(_Nodes):
     """Gauss-Lobatto rule: the contact points are the nodes of the face.
 
-    The tributary areas `lumped` are exact for cubic functions along a facet. A node on the axis has the area 0.
+    The integral over a straight facet is exact if the integrand, with the weight 2 pi R of the area, is cubic. A node
+    on the axis has the tributary area 0 (`lumped`).
 
     Args:
         solid: formulation of the body.
         on: name of the boundary.
-        assemble: function that returns the locally owned entries of a compiled linear form.
+        assemble: function that assembles a compiled linear form and returns its locally owned entries.
     """
 
     def __init__(self, solid: Any, on: str, assemble: Any):
@@ -232,7 +235,7 @@ class Vertices(_Nodes):
 
     Args:
         surface: formulation of the sheet.
-        assemble: function that returns the locally owned entries of a compiled linear form.
+        assemble: function that assembles a compiled linear form and returns its locally owned entries.
     """
 
     def __init__(self, surface: Any, assemble: Any):

@@ -38,8 +38,9 @@ class EventPrediction(Protocol):
             length: arc length of the step.
 
         Returns:
-            For each active contact the arguments times, places, guessed and speeds of `Approach.prepare`; None if the
-            prediction failed.
+            For each active contact a tuple of arrays for its n owned points: arc length of the gap closure, shape (n,);
+            position there, relative to the tool, shape (n, 2), length; mask of predicted contact forces, shape (n,);
+            derivative of the position before the closure, shape (n, 2), length. None if the prediction failed.
         """
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
@@ -71,10 +72,10 @@ class Curve(Protocol):
     """Path solver that stores the LU factors of its last tangent."""
 
     def factorise_one_sided(self, state: State) -> bool:
-        """Make sure that the stored LU factors belong to the tangent towards the next step from an accepted state.
+        """Factorise the one-sided tangent at an accepted state, unless it was factorised last.
 
-        An event predictor calls this method before it solves for the compliance of contact points. The tangent is
-        factorised only if the stored factors belong to another state.
+        From the one-sided tangent the next step starts: points whose gap just closed have the stiffness of deeper
+        contact. An event predictor calls this method before it solves for the compliance of contact points.
 
         Args:
             state: the accepted state.
@@ -222,8 +223,8 @@ class StepLimit:
 
         Args:
             trial: the trial step.
-            ends: True if `check` will shorten the step to a gap closure whose point slips too far, or against its
-                friction, afterwards. Only then may a sticking point close near the end of the step without friction.
+            ends: True if `check` may shorten the step to one of its gap closures. Only then may a sticking point, whose
+                gap closes near the end of the step, carry no friction in this step.
 
         Returns:
             Deviation of the predicted end of the step from the tangent, due to contact events: change of x, locally
@@ -245,8 +246,9 @@ class StepLimit:
             old: accepted state at the start of the step.
             new: converged state at its end.
             length: arc length of the step.
-            ends: True to also reject a step in which a point slips too far after its gap closure, or slides against the
-                slip since then. The repeated step ends at this gap closure, from which the point sticks or slides.
+            ends: True to also reject a step after whose gap closure a point slips wrongly. A sticking point then slips
+                too far without friction, or a sliding point slides against its slip since the closure. The repeated
+                step ends at this gap closure.
 
         Returns:
             Reason and admissible fraction of the step; None if the step is accepted.
@@ -329,8 +331,8 @@ class StepLimit:
             new: state at its end.
 
         Returns:
-            True if the straight path of a point relative to its tool cuts the tool deeper than allowed
-            (`Approach.cuts_tool`).
+            True if the depth on the straight path of a point exceeds the larger depth of its ends by more than
+            `StepLimits.max_cut_ratio` times the tributary length of the point.
         """
         n = self._n
         return any([c.passes_through(old.x[:n], old.control, new.x[:n], new.control) for c in self.active_contacts])

@@ -37,7 +37,7 @@ class Tooling(NamedTuple):
         """Return the tooling of a scene that is given as plain data.
 
         Args:
-            scene: the scene, as `description.describe` returns it.
+            scene: plain data of the scene, with lists of "contacts", "loads" and "supports", and the entry "mesh".
 
         Returns:
             The tooling.
@@ -110,7 +110,8 @@ def tool_of(shape: dict[str, Any]) -> Any:
     """Return the tool that is described by plain data.
 
     Args:
-        shape: the tool, as `description.describe` returns it.
+        shape: plain data of the tool. A tool in a section has the entries "pieces", lists of the values of a `Line` or
+            an `Arc`, and "closed". A tool in three dimensions has other entries.
 
     Returns:
         The tool.
@@ -130,7 +131,7 @@ def tool_of(shape: dict[str, Any]) -> Any:
 
 
 def _contact(data: dict[str, Any]) -> Contact:
-    """Return the `Contact` that is described by plain data (`description.describe`)."""
+    """Return the `Contact` that plain data describe, {name of an attribute: its value}."""
     direction = data["direction"] and tuple(data["direction"])
     names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
     options = {name: data[name] for name in names if name in data}

@@ -111,7 +111,7 @@ class Admissible:
         return max(listed(self._forms.comm, found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
 
     def volume_error_away(self, places: np.ndarray, distance: float) -> float:
-        """Return the root mean square of J - 1 over the elements far from given positions; collective.
+        """Return the root mean square of the volume change J - 1 over elements far from given positions; collective.
 
         Args:
             places: reference positions, shape (k, 2), length.
@@ -132,7 +132,7 @@ class Admissible:
         """Return the extreme volume ratios at the quadrature points of the energy; collective.
 
         Returns:
-            Smallest and largest J for the current field (dimensionless).
+            Smallest and largest volume ratio J for the current field (dimensionless).
         """
         J = np.prod(list(self.quantities().values()), axis=0)[:, :self._n]
         found = listed(self._forms.comm, (J.min(initial=np.inf), J.max(initial=-np.inf)))
@@ -157,8 +157,8 @@ class Admissible:
         """Count the inverted elements of a solid for the current field; collective.
 
         Returns:
-            Number of elements with a point where J <= 0, number of all elements, reference position (R, Z) of the
-            smallest J.
+            Number of elements with a point at which the volume ratio J is not positive, number of all elements,
+            reference position (R, Z) of the smallest J.
         """
         J = np.prod(list(self.quantities().values()), axis=0)
         mine = (np.inf, (0.0, 0.0))

@@ -38,8 +38,9 @@ class Active(NamedTuple):
         dofs: local numbers of the n constrained unknowns with ghosts, ascending, shape (n,).
         owned: mask of the locally owned unknowns in `dofs`, shape (n,).
         driver: number in `Scene.items` of the support that moves each unknown; -1 for fixed unknowns, shape (n,).
-        rows: for each constrained mean its row of the constraint matrix, locally owned entries; 0 if it is inactive.
-        means_active: for each constrained mean True if it is active.
+        rows: for each constrained mean displacement of a boundary (`ConstrainedMean`) its row of the constraint matrix,
+            locally owned entries, shape (k,); 0 if it is inactive.
+        means_active: for each constrained mean displacement True if it is active.
     """
 
     bcs: list[Any]
@@ -55,12 +56,12 @@ class Constraints:
 
     Args:
         forms: the `Formulation`.
-        assemble: function that returns the locally owned entries of a compiled linear form.
+        assemble: function that assembles a compiled linear form and returns its locally owned entries.
 
     Attributes:
         entries: list of `Entry`, the constrained unknowns.
-        means: means that are constrained (`ConstrainedMean`), list of (number of the support in `Scene.items`, row of
-            the constraint matrix). A row has the locally owned entries, shape (n,).
+        means: constrained mean displacements of boundaries (`ConstrainedMean`), list of (number of the support in
+            `Scene.items`, row of the constraint matrix). A row has the locally owned entries, shape (n,).
 
     Raises:
         InputError: a support at a position where the mesh has no node.
@@ -106,8 +107,8 @@ class Constraints:
             inactive: numbers of the inactive supports, loads and contacts in `Scene.items`.
 
         Returns:
-            The constraints of all other supports. An unknown of two supports follows a prescribed displacement, if one
-            of them has it.
+            The constraints of all other supports. If one support fixes an unknown and another one moves it, the unknown
+            follows the moving support.
         """
         entries = [entry for entry in self.entries if entry.item not in inactive]
         numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(e.dofs for e in entries)])

@@ -104,7 +104,11 @@ class ControlledLoads(BodyModel):
                                                for e in (self.potential, self.energy))
 
     def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
-        """Return `residual`, `control_derivative` and `time_derivative`."""
+        """Return the residual and its derivatives by the control, through loads and through time (UFL, rank 1).
+
+        body: fields and integrals for the virtual works of the loads. A derivative that the scene does not have is
+        None.
+        """
         v, control = self.test_function(), self._control
         residual = ufl.derivative(self.potential, self.w, v)
         for entry in self.terms:

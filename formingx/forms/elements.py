@@ -27,8 +27,9 @@ class Body(NamedTuple):
         section: in-plane part of F at the quadrature points, shape (m, k, 2, 2).
         layers: tag of the layer of each element, shape (m,).
         outline: deformed nodes around each element, shape (m, 6, 2), length.
-        quality: `shape_quality` of the deformed corner triangle of each element, shape (m,).
-        initial_quality: `shape_quality` of the reference corner triangle of each element, shape (m,).
+        quality: shape quality of the deformed corner triangle of each element (`shape_quality`), shape (m,): 1 if
+            equilateral, 0 if flat.
+        initial_quality: shape quality of the reference corner triangle of each element, shape (m,).
     """
 
     points: np.ndarray

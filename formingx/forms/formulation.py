@@ -139,13 +139,14 @@ class Formulation(ControlledLoads):
             past.refresh()
 
     def dissipated(self, factor: Any) -> Any:
-        """Return the weighted integral of the dissipated power.
+        """Return the weighted integral of the power that the materials dissipate.
 
         Args:
             factor: weight (UFL scalar).
 
         Returns:
-            Integral (UFL, rank 0) of the factor times the dissipated power per reference volume (stress/time).
+            Integral over the reference volume of the factor times the dissipated power per volume (UFL, rank 0). Its
+            unit is stress length^3/time times the unit of the factor; in plane strain it is per unit depth.
         """
         return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
                    for terms in self.terms if terms.internal)
@@ -168,12 +169,15 @@ class Formulation(ControlledLoads):
             terms: the material in the forms (`MaterialTerms`).
 
         Returns:
-            Temperatures at the last accepted state and, if it is known, at the state before, shape (1 or 2, cells, q).
+            Temperatures at the last accepted state and, if it is known, at the state before, shape (1 or 2, cells, q)
+            with q quadrature points of the energy in each cell.
         """
         return np.asarray(self.temperature.last_two_states(terms.cells, terms.places))
 
     def update_temperature(self) -> None:
-        """Update the material constants to a changed temperature, with unchanged `length` and `stress`; collective.
+        """Update the material constants to a changed temperature; collective.
+
+        The scales of length and stress of the forms do not change.
 
         Raises:
             InputError: a material constant has no value at a temperature.
@@ -193,7 +197,7 @@ class Formulation(ControlledLoads):
         return np.sort(np.concatenate([self.mesh.cells.find(self.mesh.layers[name]) for name in layers]))
 
     def admissible(self) -> Any:
-        """Return the admissibility check of the body.
+        """Return the check of the body for inverted elements and points beyond the axis.
 
         Returns:
             A new `Admissible` for the fields `w`.
@@ -328,6 +332,9 @@ class Formulation(ControlledLoads):
 
         .. math::
             \frac{1}{V} \int \dot F : \delta F \, dV
+
+        V is the reference volume. :math:`\dot F` and :math:`\delta F` are the changes of the deformation gradient by
+        trial and test function.
 
         Returns:
             Bilinear form (UFL, rank 2, dimensionless).

@@ -42,7 +42,7 @@ class FreeStretch:
         self.stretch = self._coefficient.at_time(forms.time)
 
     def update_temperature(self) -> None:
-        """Update the stretch to a changed temperature of the body."""
+        """Update the thermal stretch to a changed temperature of the body."""
         self._coefficient.update(map(self._temperatures, self._cells))
 
     def elastic(self, F: Any) -> Any:
@@ -52,6 +52,6 @@ class FreeStretch:
             F: deformation gradient (UFL, shape (3, 3)).
 
         Returns:
-            F / J_T^(1/3) (UFL, shape (3, 3)).
+            F / J_T^(1/3), with the volume ratio J_T of the free thermal expansion (UFL, shape (3, 3)).
         """
         return F / self.stretch

@@ -30,7 +30,7 @@ class History(Protocol):
     - `get` stores the values, `advance` updates them to the end of a trial step, and `put` restores the stored ones.
     - `advance` alone accepts a state.
     - `get` and `put` also change to another accepted state and back.
-    - `save` and `load` write to and read from a file, on any number of ranks.
+    - `save` makes data for a file, and `load` takes them back, on any number of ranks.
     - `transfer` transfers the values to a problem of the same body on another mesh.
 
     The result of `get` is never changed and is valid on the same ranks only. The result of `save` is valid on any

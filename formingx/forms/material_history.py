@@ -192,9 +192,10 @@ class MaterialHistory:
         return self._storage[name][0]
 
     def _rows(self, name: str, cells: np.ndarray) -> np.ndarray:
-        """Return the numbers of the quadrature points of some cells, shape (cells, points of a cell).
+        """Return the rows of an internal variable's values that belong to some cells, shape (cells, points of a cell).
 
-        name: an internal variable; the numbers are the row numbers of its values `_array`.
+        name: the internal variable, whose values have a row for each quadrature point. cells: local numbers, shape
+        (cells,).
         """
         return self._storage[name][1][cells]
 

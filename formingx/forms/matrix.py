@@ -20,13 +20,13 @@ from .. import _compat
 
 
 class ExtendedMatrix:
-    """Sparse matrix of tangent and constraints, allocated once and refilled for every tangent.
+    """Sparse matrix of a tangent K and m constraint rows C, allocated once and refilled for every tangent.
 
     Args:
         form: compiled bilinear form of K.
         index_map: index map of its space (block size 1).
-        bcs: DirichletBCs as in `constrain`; later ones must constrain a subset of these unknowns.
-        rows: rows of C as in `constrain`; later rows must be 0 wherever these are 0.
+        bcs: DirichletBCs of constrained unknowns. Later calls of `constrain` may constrain a subset of them.
+        rows: list of the m rows of C, locally owned entries, shape (n,) each. Later rows must be 0 where these are 0.
         comm: MPI communicator.
         symmetric: True if K is symmetric.
 
@@ -56,8 +56,8 @@ class ExtendedMatrix:
 
         Args:
             bcs: DirichletBCs of constrained unknowns; their rows and columns become unit vectors.
-            rows: rows of C, locally owned entries, shape (n,) each. If a row is 0 on all ranks, row and column of its
-                multiplier become unit vectors too.
+            rows: list of the rows of the constraint matrix C, locally owned entries, shape (n,) each. If a row is 0 on
+                all ranks, row and column of its multiplier become unit vectors too.
         """
         self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]
         self._constrained = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
@@ -74,8 +74,9 @@ class ExtendedMatrix:
         """Assemble the matrix for the current values of the form's functions.
 
         Args:
-            blocks: list of (dofs, values): local unknowns with ghosts, shape (n, m), and values added to K, shape (n,
-                m, m). The m unknowns of a block must share a cell. Entries of constrained unknowns are skipped.
+            blocks: list of (dofs, values): local unknowns with ghosts, shape (n, m), and values added to the tangent,
+                shape (n, m, m). The m unknowns of a block must share a cell. Entries of constrained unknowns are
+                skipped.
 
         Returns:
             The assembled matrix.
@@ -100,7 +101,7 @@ class ExtendedMatrix:
     def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the sparsity pattern: row pointers and global column numbers of all locally owned rows.
 
-        rows: rows of C, locally owned entries, shape (n,) each. m: their number.
+        rows: rows of the constraint matrix C, locally owned entries, shape (n,) each. m: their number.
         """
         plain = fem_petsc.create_matrix(self._form)
         _compat.assemble_matrix(plain, self._form, self._bcs)

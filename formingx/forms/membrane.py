@@ -83,7 +83,9 @@ class MidSurface(Formulation):
                          f" only")
 
     def constraints(self, support: Any) -> list[Any]:
-        """Return the constraints of a support at an end; a mean over an end becomes the value at its point.
+        """Return the constraints that a support at an end of the membrane imposes on the displacement.
+
+        A constraint of the mean displacement of an end becomes a constraint of the displacement of its single point.
 
         Args:
             support: the `Support`.
@@ -217,7 +219,10 @@ class MidSurface(Formulation):
         return self.scene.kinematics.weight(self.X) * self._tangent[0]
 
     def _deformation_gradient(self) -> Any:
-        """Return the deformation gradient diag(l1, 1/(l1 l2), l2) in principal axes: meridian, normal, hoop."""
+        """Return the deformation gradient diag(l1, 1/(l1 l2), l2) in principal axes: meridian, normal, hoop.
+
+        l1 and l2 are the principal stretches along the meridian and along the circumference.
+        """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)         # of the surface: its normal is kept
         t = F * ufl.as_vector([self._tangent[0], self._tangent[1], 0])
         l1, l2 = ufl.sqrt(ufl.inner(t, t)), F[2, 2]

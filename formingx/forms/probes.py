@@ -178,10 +178,11 @@ class MidSurfaceProbe(Probe):
         self._average_slopes(element, geometry)
 
     def _average_slopes(self, element: Any, geometry: Any) -> None:
-        """Prepare means over both elements at points where two elements meet, of the tangent and of du/dS.
+        """Replace `_tangent` by its mean over both elements at points where two elements meet; collective.
 
-        u is the displacement and S the reference arc length of the mid-surface. element: scalar element of a
-        displacement component. geometry: scalar element of the mid-surface.
+        Data for the mean of du/dS at these points are stored in `_ends`, with the displacement u and the reference arc
+        length S of the mid-surface. element: scalar element of a displacement component. geometry: scalar element of
+        the mid-surface.
         """
         forms, domain = self._problem.forms, self._problem.forms.domain
         nodes = cell_node_positions(domain, own_cells(domain))

@@ -43,7 +43,8 @@ class StepData:
     def first(cls, scene: Any) -> StepData:
         """Return the step data of the unloaded scene, in which all loads, supports and contacts are active.
 
-        If the scene has one with a control, its amplitude equals the control. All other amplitudes are 0.
+        If a load, support or contact of the scene is controlled, its amplitude is the control. All other amplitudes are
+        0.
 
         Args:
             scene: the `Scene`.
@@ -66,7 +67,7 @@ class StepData:
 
     @property
     def is_constant(self) -> bool:
-        """True if the control changes no amplitude, at most the process time."""
+        """True if no amplitude depends on the control; the process time may depend on it."""
         return not any(self.rate[:-1])
 
     def amplitude(self, number: int, control: float) -> float:
@@ -89,8 +90,8 @@ class StepData:
             control: load parameter (control), dimensionless.
 
         Returns:
-            The amplitude; 0 for an inactive load. While forces fade, it is multiplied by the control for an activated
-            load, and by 1 - control for a deactivated load.
+            The amplitude; 0 for an inactive load. If `fading` is True, the amplitude of a just activated load is
+            multiplied by the control, that of a just deactivated load by 1 - control.
         """
         share = float(number not in self.inactive)
         if self.fading and number in self.changed:

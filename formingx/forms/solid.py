@@ -168,8 +168,8 @@ class Solid(Formulation):
         .. math::
             W(F) - \sigma_0 \ln J + p (J - 1)
 
-        :math:`\sigma_0` is the `rest_stress` of the material. A penalty model has a penalty in place of :math:`p (J -
-        1)`.
+        W is the strain energy, J the volume ratio without thermal expansion, p a pressure field, and :math:`\sigma_0`
+        the stress dW/dF11 at F = I. A penalty model has a penalty in place of :math:`p (J - 1)`.
 
         Args:
             names: layers of the body.
@@ -185,12 +185,12 @@ class Solid(Formulation):
                           ) -> list[tuple[Any, dict]]:
         """Return the terms of the energy density of layers of one material, for an elastic deformation gradient.
 
-        The terms are the strain energy and the terms of incompressibility, see `energy_densities`.
+        The terms are the strain energy and those that make the material incompressible: a pressure field or a penalty.
 
         Args:
             names: names of the layers.
             F: deformation gradient without thermal expansion (UFL, shape (3, 3)).
-            pressures: pressure fields (UFL, dimensionless).
+            pressures: all pressure fields of the solid, numbered as in `pressure_of` (UFL scalars, dimensionless).
             density: function of (terms, F) that returns the energy density of a `MaterialTerms`.
 
         Returns:

@@ -51,8 +51,8 @@ class StepError:
         """Estimate the time integration error of a step by step doubling.
 
         Errors and stresses are root mean squares over the body. Errors are divided by the largest of three stresses: at
-        the start of the step, at its end, and after complete relaxation. They are multiplied by 4 if errors of
-        successive steps have the same sign.
+        the start of the step, at its end, and after complete relaxation. Both errors are multiplied by 4 if the body
+        has a material whose errors have the same sign in every step (`Material.motion_variables` or an integral law).
 
         Args:
             past: k accepted states, with x and time; the step begins at the last of them.
@@ -141,10 +141,12 @@ class StepError:
 
 
 class _Stress:
-    r"""Deviatoric Kirchhoff stress of an energy of a material, at the quadrature points of the energy.
+    r"""Deviatoric Kirchhoff stress of a material at the quadrature points of the energy.
 
     .. math::
         \tau = \mathrm{dev} \left( \frac{\partial W}{\partial F} F^T \right)
+
+    W is an energy of the material per reference volume, and F the deformation gradient without thermal expansion.
     """
 
     def __init__(self, forms: Any, terms: Any, energy: Callable):

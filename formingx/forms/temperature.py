@@ -38,7 +38,7 @@ class Temperature:
             places: positions in the reference cell, shape (q, 2).
 
         Returns:
-            Temperatures, shape (1 or 2, cells, q), cut off at `limits`.
+            Temperatures, shape (1 or 2, cells, q), cut off at the lowest and highest possible temperature (`limits`).
         """
         values = [self.T.x.array] if self.before is None else [self.T.x.array, self.before]
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
@@ -50,12 +50,12 @@ class Temperature:
             points: reference positions, shape (n, 2), length.
 
         Returns:
-            Temperatures, shape (n,), cut off at `limits`.
+            Temperatures, shape (n,), cut off at the lowest and highest possible temperature (`limits`).
         """
         return np.clip(fields.values_at(self.T, np.asarray(points, dtype=float), self._given.mesh), *self.limits)
 
     def nodes(self, points: np.ndarray) -> np.ndarray:
-        """Return the nodes of T at points of this rank's cells.
+        """Return the nodes of the temperature field at given positions in this rank's cells.
 
         Args:
             points: reference positions of nodes, shape (..., 2), length.
@@ -67,12 +67,12 @@ class Temperature:
         return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :points.shape[-1]]).query(points)[1]
 
     def at_nodes(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the temperatures at nodes of T.
+        """Return the temperatures at nodes of the temperature field.
 
         Args:
             nodes: local numbers of the nodes, any shape.
 
         Returns:
-            Temperatures, the same shape, cut off at `limits`.
+            Temperatures, the same shape, cut off at the lowest and highest possible temperature (`limits`).
         """
         return np.clip(self.T.x.array[nodes], *self.limits)

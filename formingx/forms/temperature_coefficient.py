@@ -39,13 +39,13 @@ class TemperatureCoefficient:
         self.update(temperatures)
 
     def at_time(self, time: Any) -> Any:
-        """Return the coefficient, extrapolated to a time of the step.
+        """Return the coefficient at a time of the step, extrapolated from the last two accepted states.
 
         Args:
             time: process time (UFL scalar).
 
         Returns:
-            Coefficient f(t) of the class (UFL scalar).
+            Coefficient (UFL scalar); if temperatures do not change, its value at the beginning of the step.
         """
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 

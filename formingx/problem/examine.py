@@ -141,9 +141,10 @@ def _smallest_J(problem: Any, elements: Body) -> tuple[float, Place, tuple]:
 
 
 def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], Place, np.ndarray]:
-    """Return {field: norm of its residual over the norm of the support forces}, and where a node is least balanced.
+    """Return the residual of each field, and the place and position of the node with the largest residual force.
 
-    The node has the largest out-of-balance force; its place in the mesh and its reference position are returned.
+    Residuals are {field: norm over the norm of the support forces}, for "displacement", "pressure" and "multipliers".
+    The place is a `Place` with layer and nearest boundary; the reference position (R, Z) has the shape (2,), length.
     """
     out, comm, space = x.duplicate(), problem.comm, problem.forms.space
     problem.residual(x, control, out)
@@ -189,7 +190,10 @@ def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
 
 
 def _status_changes(problem: Any, attempt: Any) -> int | None:
-    """Return the number of points whose contact status changed in the last iteration; None without contact."""
+    """Return the number of points whose contact status changed in the last iteration; None without contact.
+
+    attempt: the last iterate x and control, with their last corrections dx and dcontrol.
+    """
     if not problem.active_contacts:
         return None
     n, count = problem.forms.space.dofmap.index_map.size_local, 0
@@ -203,7 +207,11 @@ def _status_changes(problem: Any, attempt: Any) -> int | None:
 
 
 def _draw(elements: Body, marks: list, tools: list, title: str, file: Any) -> None:
-    """Draw deformed elements coloured by J, marked points (label, position) and tools to a file."""
+    """Write a picture of deformed elements, coloured by the volume ratio J, with marked points and tools.
+
+    marks: list of (label, deformed position). tools: list of (tool, its displacement). file: name of the picture; its
+    ending is the format.
+    """
     from matplotlib.collections import PolyCollection
     size = np.ptp(elements.outline, axis=(0, 1))
     wide = size[0] > 4 * size[1]

@@ -51,8 +51,8 @@ class Problem(Stages, Units):
         contacts: contacts of the scene (`FaceContact`).
         active_contacts: contacts that are active in the current stage.
         histories: history variables on which F depends (`History`): contacts, then materials, then the temperature.
-        limit: contact's limits to the length of a step (`StepLimit`).
-        admissible: admissibility check of the body, and its volume ratios (`Admissible`).
+        limit: limits that the contacts set to the length of a step (`StepLimit`).
+        admissible: check for inverted elements and points beyond the axis, and volume ratios (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
 
@@ -207,20 +207,20 @@ class Problem(Stages, Units):
         return values
 
     def has_inverted_element(self, x: PETSc.Vec, control: float) -> bool:
-        """Return True if an element of the body is inverted or crosses the axis in a state, see `Admissible.holds`.
+        """Return True if an element of the body is inverted in a state, or if a point lies beyond the axis; collective.
 
         Args:
             x: unknowns.
             control: load parameter (control), dimensionless.
 
         Returns:
-            True if a hoop stretch or an in-plane determinant is not positive.
+            True if a hoop stretch or an in-plane determinant of the deformation gradient is not positive.
         """
         self.set_state(x, control)
         return not self.admissible.holds()
 
     def extreme_volume_ratio(self, state: Any) -> WorstValue | None:
-        """Return the volume ratio with the largest |ln J| in a state; collective.
+        """Return the volume ratio J with the largest |ln J| in a state; collective.
 
         Args:
             state: a `State` of the path.
@@ -246,11 +246,11 @@ class Problem(Stages, Units):
             return self.admissible.volume_error_away(places, distance)
 
     def inverted_elements(self) -> tuple[int, int, tuple[float, float]]:
-        """Count the inverted elements at the state last set; collective.
+        """Count the inverted elements for the current fields of the forms; collective.
 
         Returns:
-            Number of elements with a point where J <= 0, number of all elements, reference position (R, Z) of the
-            smallest J.
+            Number of elements with a point at which the volume ratio J is not positive, number of all elements,
+            reference position (R, Z) of the smallest J.
         """
         return self.admissible.inverted_elements()
 

@@ -49,7 +49,7 @@ class Stages(Vectors):
         x: vector of unknowns; inside `state_context` the unknowns of the state.
         contacts: contacts of the scene.
         active_contacts: the active contacts.
-        matrix: the tangent.
+        matrix: the tangent dF/dx of the residual, with the constraints.
     """
 
     scene: Scene
@@ -124,7 +124,8 @@ class Stages(Vectors):
         """Restore step data, history variables and process time of an accepted state, to start a step from it.
 
         Args:
-            state: the state, see `state_context`.
+            state: object with x (locally owned entries), control, time, setting (`StepData` as plain data, or empty)
+                and history_variables.
         """
         if self.has_history:
             self.history_variables = state.history_variables
@@ -135,10 +136,10 @@ class Stages(Vectors):
 
     @property
     def fading_forces(self) -> np.ndarray | None:
-        """Forces f of the fading of unbalanced forces, shape (n,); None if the step data have no fading.
+        """Forces f that a change of loads, supports or contacts left out of balance, for the locally owned fields.
 
-        At a control the unbalanced forces are (1 - control) f. They are dimensionless, for the locally owned field
-        unknowns.
+        They fade as the control goes from 0 to 1: at a control, (1 - control) f is subtracted from the residual. Shape
+        (n,), dimensionless; None if the step data have no fading.
         """
         return None if self._stage.unbalanced is None else self._stage.unbalanced[: self._n]
 
@@ -163,7 +164,8 @@ class Stages(Vectors):
             control: load parameter (control), dimensionless.
 
         Returns:
-            Lagrange multipliers of the constrained means, shape (means,), the same on all ranks.
+            Lagrange multipliers of the constrained mean displacements of boundaries (`ConstrainedMean`), shape
+            (means,), the same on all ranks.
         """
         values, last = x.array_r, self.comm.size - 1
         self.set_fields_and_control(values, control)

@@ -43,7 +43,7 @@ class Vectors(Histories):
 
     @cached_property
     def _metric(self) -> np.ndarray:
-        """Lumped mass matrix of the displacement for density 1/V, locally owned diagonal entries, shape (n,)."""
+        """Lumped mass matrix of the displacement for density 1/volume, locally owned diagonal entries, shape (n,)."""
         return np.asarray(np.maximum(self.assemble(self.forms.compile(self.forms.metric_row())), 0))
 
     def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
@@ -91,7 +91,7 @@ class Vectors(Histories):
         self.fill(out, self.forms.w.x.array[: self._n])
 
     def assemble(self, form: Any) -> np.ndarray:
-        """Assemble a compiled linear form at the state last set.
+        """Assemble a compiled linear form at the current fields and control of the forms.
 
         Args:
             form: compiled linear form.
@@ -102,7 +102,7 @@ class Vectors(Histories):
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def assemble_scalar(self, form: Any) -> float:
-        """Assemble a compiled scalar form at the state last set, over all ranks.
+        """Assemble a compiled scalar form at the current fields and control of the forms, over all ranks.
 
         Args:
             form: compiled form without arguments.

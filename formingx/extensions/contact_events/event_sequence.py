@@ -137,10 +137,10 @@ class ContactEventSequence:
         """Return the gap closures within an arc length `length`, as four lists with an array for each face.
 
         Returns:
-            Arc lengths at which the gaps of locally owned points close, shape (n,); `length` for other points.
-            Positions of the points relative to the tool at these arc lengths, shape (n, 2). Mask of the points that
-            carry a predicted contact force at `length`, shape (n,). Derivatives of the positions with respect to arc
-            length before the closure, shape (n, 2); 0 for other points.
+            Arc lengths at which the gaps of locally owned points close, shape (n,); `length` for points without a gap
+            closure. Positions of the points relative to the tool at these arc lengths, shape (n, 2). Mask of the points
+            that carry a predicted contact force at `length`, shape (n,). Derivatives of the positions with respect to
+            arc length just before the gap closure, shape (n, 2); 0 for points without one.
         """
         piece, points = self._piece(length), self._points
         arc_lengths, positions = np.full(len(piece.positions), length), piece.after(length).positions.copy()
@@ -158,7 +158,9 @@ class ContactEventSequence:
         return self._points.of_faces(self._piece(length).after(length).positions)
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the deviation (x, control) of the predicted path from the tangent at an arc length; None if it is 0.
+        """Return x and control of the predicted path at an arc length, minus those on the tangent.
+
+        The change of x has the locally owned entries, shape (size,). The result is None if it is 0 or not finite.
         """
         piece, m = self._piece(length), len(self._points.point_ids)
         if self._end is not None and piece.begins < self._end.begins <= length:
@@ -174,10 +176,10 @@ class ContactEventSequence:
                 piece.correction[1] - float(self._points.steps @ piece.extra.ravel()))
 
     def _projected(self, piece: PathSegment, moved: np.ndarray | None = None) -> PathSegment:
-        """Return a segment at whose start closed points are projected onto their tools or sticking positions.
+        """Return a segment at whose start closed points are moved onto their tools or to their sticking positions.
 
-        Repeat it for curved tools, since a projection is along their tangents. moved: motion of the n points that is
-        added to the start of the segment before the projection, shape (n, 2), length; None: no motion.
+        The points move along the tangents of their tools, so curved tools need several calls. moved: motion of the n
+        points, shape (n, 2), length, that is first added to the start of the segment; None: no motion.
         """
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         u = np.zeros(piece.force.shape) if moved is None else points.values_at(moved)
@@ -192,7 +194,11 @@ class ContactEventSequence:
         return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
 
     def _free_sliding(self) -> bool:
-        """Make the contact forces of points that slide at the accepted state unknowns; return False if this fails."""
+        """Apply Coulomb's law to the points that slide at the accepted state; return False if this fails.
+
+        In the factorised tangent their forces follow from its contact stiffness. If their number is at most
+        `EventSettings.max_sliding_points`, they are added to `_points`, and their forces become unknowns.
+        """
         x, control = self._tangent[:2]
         points = self._points
         slide = self._area & ~self._free & ~points.sticks
@@ -216,8 +222,8 @@ class ContactEventSequence:
     def _append(self, piece: PathSegment, status: np.ndarray, near: ToolFrame | None = None) -> bool:
         """Append a segment with new contact statuses to the path; return False if no statuses are admissible.
 
-        piece: segment whose start is the start of the new one. status: first statuses of the search, shape (m,). near:
-        geometry of the tools at this start; None: it is computed.
+        piece: segment whose start is the start of the new one. status: statuses with which the search for admissible
+        statuses begins, shape (m,). near: geometry of the tools at the start; None: it is computed.
         """
         points, near = self._points, near or self._points.tool_frame(piece.positions, piece.force)
         self._near, self._work = near, self._work + 1
@@ -238,7 +244,8 @@ class ContactEventSequence:
     def _close(self, length: float) -> bool:
         """Append the segment after the last gap closure, in which the closed point carries a contact force.
 
-        length: arc length of the step, up to which points are chosen. The result is False if no segment was found.
+        length: arc length of the step. The result is False if the state at the gap closure, the compliance of the point
+        or admissible contact statuses were not found.
         """
         last, closure, end = self._pieces[-1], self._closures[-1], self._end
         if end is None or closure.point_id not in self._points.point_ids and not self._learn(length):
@@ -277,15 +284,17 @@ class ContactEventSequence:
     def _gap_closures(self, segment: PathSegment, length: float) -> np.ndarray:
         """Return the arc lengths, from the start of a segment, at which the gaps of the n points close, shape (n,).
 
-        segment: straight segment of the predicted path. length: arc length of its end; the result for other points.
+        segment: straight segment of the predicted path. length: arc length of the segment, which is also the result for
+        points whose gaps stay open.
         """
         parts = zip(self._faces, *map(self._points.of_faces, (segment.positions, segment.speed, self._free)))
         return np.concatenate([gap_closures(face.law, x, w, free, length) for face, x, w, free in parts])
 
     def _store_first(self, arc_lengths: np.ndarray, length: float, segment: PathSegment) -> bool:
-        """Store the earliest gap closure of all ranks; return False if there is none before an arc length.
+        """Append the earliest gap closure of all ranks to `_closures`; return False if none is before `length`.
 
-        arc_lengths: arc lengths of the gap closures of the n points, shape (n,). segment: segment with their positions.
+        arc_lengths: arc lengths of the gap closures of the n points, shape (n,). segment: segment of the predicted path
+        that gives the position of the point. All arc lengths are measured from the accepted state.
         """
         best: tuple[float, int, int, int] = (length, 0, 0, 0)
         if len(arc_lengths):
@@ -347,10 +356,10 @@ class ContactEventSequence:
         return False
 
     def _missed(self, end: PathSegment, last: PathSegment, but: GapClosure | None = None) -> np.ndarray:
-        """Return the arc lengths at which open points passed the surface of a tool, shape (n,).
+        """Return the arc lengths at which open points entered a tool along the segment `last`, shape (n,).
 
-        They are inside the tool at the start of the segment `end`, and moved along `last`, the segment before. For
-        other points, and for the point of the closure `but`, the result is the arc length of `end`.
+        end: segment after `last`, at whose start such points lie inside the tool. The result is the arc length at the
+        start of `end` for points outside, and for the point whose gap closure is `but`.
         """
         arc_lengths, free = np.full(len(self._free), end.begins), self._free.copy()
         if but and but.rank == self._comm.rank:
@@ -391,9 +400,10 @@ class ContactEventSequence:
             correction=(mean([p.correction[0] for p in after]), float(mean([p.correction[1] for p in after]))))
 
     def _iterated(self, s: float, piece: PathSegment) -> PathSegment | None:
-        """Return a segment with unknowns corrected by one modified Newton iteration; None if it fails.
+        """Return a segment after one modified Newton iteration towards equilibrium; None if it fails.
 
-        s: arc length of the iteration. piece: segment before it. Positions and forces of the points change, too.
+        s: arc length at which the iteration takes place and the result begins. piece: segment to be corrected. Its
+        positions, contact forces and `correction` are replaced in the result.
         """
         piece, points = piece.extended(len(self._points.point_ids)).after(s), self._points
         x, control, direction, slope = self._tangent
@@ -414,10 +424,10 @@ class ContactEventSequence:
         return piece._replace(correction=(piece.correction[0] + change[0], piece.correction[1] + change[1]))
 
     def _learn(self, length: float) -> bool:
-        """Compute the compliance of the point that closed last and of points that will close next.
+        """Compute the compliance of the point that closed last, and of the points that close next before `length`.
 
-        length: arc length of the step, up to which points are chosen. The result is False if the stored LU factors no
-        longer belong to the state.
+        length: arc length of the step. The compliance is stored in `_points`. The result is False if the stored LU
+        factors no longer belong to the state.
         """
         last, closure, points, chosen = self._pieces[-1], self._closures[-1], self._points, []
         left = length - last.begins

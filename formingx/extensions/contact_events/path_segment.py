@@ -10,22 +10,25 @@ from ...physics.contact_law import ContactStatus
 
 
 class PathSegment(NamedTuple):
-    """Linear segment of the predicted path, from an arc length to the next event, with m points of known compliance.
+    """Linear segment of the predicted path, from an arc length to the next event.
 
-    The contact stiffness of points that were closed at the accepted state is part of the factorised tangent.
+    n is the number of all contact points of this rank. m is the number of those points, of all ranks, whose compliance
+    is known: the motion of the body under unit forces at the points. The contact stiffness of points that were closed
+    at the accepted state is part of the factorised tangent.
 
     Attributes:
         begins: arc length at the start of the segment, from the accepted state.
         positions: positions of the n points of all faces relative to their tools at the start, shape (n, 2), length.
         speed: derivatives of the positions with respect to arc length, shape (n, 2), length.
-        status: contact statuses, shape (m,).
-        place: sticking positions, shape (m, 2), length.
+        status: contact statuses, shape (m,): -1 or 1 for sliding against or along the tangent of the tool, 0 sticking,
+            2 open (`ContactStatus`).
+        place: positions relative to the tools at which sticking points have no tangential force, shape (m, 2), length.
         force: contact forces at the start, with the sign and scale of the residual F, shape (m, 2), dimensionless.
         rate: derivatives of `force` with respect to arc length, shape (m, 2).
         extra: change of `force` since the accepted state, minus the part due to the contact stiffness in the factorised
             tangent, shape (m, 2).
         growth: derivatives of `extra` with respect to arc length, shape (m, 2).
-        correction: sum of the equilibrium corrections of (x, control).
+        correction: sums of all equilibrium corrections of x, locally owned entries, and of the control.
     """
 
     begins: float
@@ -47,7 +50,7 @@ class PathSegment(NamedTuple):
                                                   extra=self.extra + ds * self.growth)
 
     def extended(self, m: int) -> PathSegment:
-        """Return this segment of the path with forces and statuses for m points (`Points`); added points are open."""
+        """Return this segment with forces and statuses for m points; points added at the end are open."""
         added = m - len(self.status)
         if not added:
             return self

@@ -55,8 +55,8 @@ class ContactEventPredictor:
     def active(self) -> bool:
         """True if contact events are predicted for the contacts that are active now.
 
-        At least one face must stick, since only then the order of the gap closures matters. All contact laws must be
-        predictable (`ContactLaw.predictable`), so that forces follow from distances.
+        At least one contact must be without slip (`Contact.sticks`) and allow several gap closures in a step. All
+        contact laws must be predictable (`ContactLaw.predictable`), so that forces follow from distances.
         """
         contacts = self._limit.active_contacts
         return any(c.face.contact.sticks and self.allowed(c) > c.max_closures for c in contacts) and all(
@@ -99,9 +99,10 @@ class ContactEventPrediction:
                                               state.slope, response, max(allowed))
 
     def step_length(self, length: float) -> float | None:
-        """Return the arc length of a step in which the allowed number of gaps closes.
+        """Return the arc length after which the gaps of the admissible number of points of a face have closed.
 
-        The step is shorter if a point would pass through a tool.
+        The class has this number, `allowed`. It is 1 on a face of which at most one point is closed at the accepted
+        state. The length is halved while a point would pass through a tool.
 
         Args:
             length: largest arc length of the step.
@@ -118,10 +119,10 @@ class ContactEventPrediction:
         return found
 
     def _length_to_closures(self, length: float) -> float | None:
-        """Return the arc length, at most `length`, at which the allowed number of gaps of a face has closed.
+        """Return the arc length, at most `length`, at which the gaps of `allowed` points of a face have closed.
 
-        The prediction keeps points closed that stick at the start of the step. If such a point is in tension before a
-        gap closure, the step therefore ends before this closure. The result is None if the prediction fails.
+        The prediction assumes that points that stick at the start of the step stay closed. If such a point is in
+        tension at a gap closure, the step ends before this closure. The result is None if the prediction fails.
         """
         sequence, before, at_start = self._sequence, 0.0, LIMITS.start_fraction * length
         allowed = [most if touching > 1 else 1 for most, touching in zip(self._allowed, sequence.touching)]
@@ -146,10 +147,10 @@ class ContactEventPrediction:
 
     @cached_property
     def _sticking(self) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
-        """Sticking points of the accepted state that may open, as a tuple for each face.
+        """Sticking points of the accepted state that may open, m on each face, as a tuple for each face.
 
-        The tuple is (number of the face, mask of these m points, normal tractions N, shape (m,), positions x, shape (m,
-        2), length, derivatives dN/dx, shape (m, 2)).
+        Entries are the number of the face; a mask of these points among the n owned points, shape (n,); normal
+        tractions N, shape (m,), stress; positions x, shape (m, 2), length; derivatives dN/dx, shape (m, 2).
         """
         found = []
         for f, (approach, x) in enumerate(zip(self._contacts, self._sequence.positions(0.0))):

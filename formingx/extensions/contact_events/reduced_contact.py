@@ -192,20 +192,24 @@ class Points:
         return np.asarray(combined(self._comm, found, MPI.SUM))
 
     def spread(self, values: np.ndarray, among: np.ndarray) -> None:
-        """Write values at the m points, shape (m, ...), into `among`, values at the n owned points of all faces."""
+        """Write values at the m points, shape (m, ...), into an array of the n owned points of all faces.
+
+        among: this array, shape (n, ...), changed in place at those of the m points that this rank owns.
+        """
         among[self._rows] = values[self._mine]
 
     def _located(self, point_ids: Sequence[tuple[int, int, int]]) -> tuple[Any, np.ndarray]:
-        """Return the indices of the owned points in a list, and their numbers among the owned points of all faces.
+        """Return the indices in `point_ids` of the k points that this rank owns, and their numbers.
 
-        point_ids: (rank, face, point) of each point.
+        point_ids: (rank, face, point) of each point. The indices are a slice or an array, shape (k,). The numbers count
+        the owned points of all faces, shape (k,).
         """
         ids = np.array(point_ids, dtype=int).reshape(-1, 3)
         mine = slice(None) if self._comm.size == 1 else np.flatnonzero(ids[:, 0] == self._comm.rank)
         return mine, np.array(self.starts)[ids[mine, 1]] + ids[mine, 2]
 
     def motion_to_targets(self, positions: np.ndarray, place: np.ndarray, near: ToolFrame) -> np.ndarray:
-        """Return the motion that takes the m points of known compliance to their target positions.
+        """Return the motion that takes the m points (`point_ids`) to their target positions.
 
         The tangential motion leads to `place`. The normal motion leads to the depth at which the contact law gives the
         current force.
@@ -213,7 +217,7 @@ class Points:
         Args:
             positions: positions of the n owned contact points relative to their tools, shape (n, 2), length.
             place: target positions of the m points along their tools, shape (m, 2), length.
-            near: geometry of the tools at the m points, with the missing depth.
+            near: geometry of the tools at the m points; its `beyond` is the normal motion.
 
         Returns:
             Motion, shape (m, 2), length.
@@ -222,15 +226,15 @@ class Points:
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
     def tool_frame(self, positions: np.ndarray, force: np.ndarray) -> ToolFrame:
-        """Return the geometry of the tools at the m points of known compliance.
+        """Return the geometry of the tools at the m points (`point_ids`).
 
         Args:
             positions: positions of the n owned contact points relative to their tools, shape (n, 2), length.
             force: contact forces at the m points, with the sign and scale of the residual F, shape (m, 2).
 
         Returns:
-            Normals, tangents and curvatures. Also the depth at which the contact law gives these forces, minus the
-            depth of the points.
+            Normals, tangents and curvatures of the tools. `beyond` is the depth at which the contact law gives the
+            force of a point, minus the depth of the point.
         """
         k, own = len(self._rows), force[self._mine]
         if self._profiles is None:
@@ -246,8 +250,9 @@ class Points:
     def _profiles(self) -> tuple[np.ndarray, np.ndarray] | None:
         """Profiles of all tools, or None if a contact law does not use the profile of its tool.
 
-        The first array has their pieces (lines and arcs), shape (pieces, 9). The second has for each of the n owned
-        points the row of the first piece of its tool, the number of pieces and the number of lines, shape (n, 3).
+        The first array has a row for each line and arc, shape (pieces, 9), as `formingx.tools.nearest.nearest` takes
+        them. The second has the row of the first piece of the tool of each of the n owned points, the number of pieces
+        and the number of lines, shape (n, 3).
         """
         tools = [face.law.profile for face in self._faces]
         if None in tools:
@@ -258,9 +263,10 @@ class Points:
         return np.concatenate(tables), np.repeat(np.array(ranges), np.diff(self.starts), axis=0)
 
     def _frame_by_arrays(self, positions: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """Return the result of the C function `frame` for owned points, shape (6 k,), for any tools.
+        """Return the tool geometry at the k owned ones of the m points as the C function `frame` does, for any tools.
 
-        positions: of the n owned points of all faces, shape (n, 2), length. force: at the k points, shape (k, 2).
+        positions: of the n owned points of all faces, shape (n, 2), length. force: at the k points, shape (k, 2). The
+        result, shape (6 k,), has normals (k, 2), tangents (k, 2), curvatures (k,) and `ToolFrame.beyond` (k,), flat.
         """
         found = np.zeros((6, len(self._rows)))
         for face, first, end in zip(self._faces, self.starts, self.starts[1:]):
@@ -286,7 +292,7 @@ class Points:
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
     def motion_under(self, forces: np.ndarray) -> np.ndarray:
-        """Return the motion of the n owned points of all faces under contact forces at the m points.
+        """Return the motion of the n owned points of all faces under contact forces at the m points (`point_ids`).
 
         Args:
             forces: contact forces, subtracted from the residual F, shape (m, 2).
@@ -301,18 +307,19 @@ class Points:
         """Compute the contact forces F at the end of a given motion, for given contact statuses.
 
         Args:
-            u: motion dx of the points if the contact forces did not change, shape (m, 2), length.
-            status: contact statuses, shape (m,): -1 or 1 for the sense of sliding, 0 sticking, 2 open
-                (`ContactStatus`).
+            u: motion of the points if the contact forces did not change, shape (m, 2), length.
+            status: contact statuses, shape (m,): -1 or 1 for sliding against or along the tangent of the tool, 0
+                sticking, 2 open (`ContactStatus`).
             near: geometry of the tools at the m points.
-            force: current contact forces, shape (m, 2).
-            to: motion of sticking points to the positions at which their tangential force is 0, shape (m, 2), length;
-                an elastic slip g_s T/(mu N) is added. For sliding points the motion to the surface of their tools.
-                g_s is `elastic_slip`, N and T are the normal and tangential force.
+            force: contact forces before the motion, shape (m, 2).
+            to: motion of sticking points to the positions at which their tangential force is 0, and of sliding points
+                to the surface of their tools, shape (m, 2), length. The elastic slip g_s T/(mu N) of a sticking point
+                is added, with `elastic_slip` g_s, tangential and normal force T and N, and friction mu.
 
         Returns:
-            New forces F; change of force beyond the stiffness S in the factorised tangent, dF - S dx; shape (m, 2)
-            each. If no such forces exist, F is `force`, and the second array is NaN.
+            New forces F, and their change without the part in the factorised tangent, F - `force` - S dx, shape (m, 2)
+            each. S is the contact stiffness of the points in that tangent, dx their motion. If no such forces exist,
+            the first array is `force`, and the second is NaN.
         """
         F, outside = np.empty(force.shape), np.empty(force.shape)
         good = compiled().forces_at_end(
@@ -328,13 +335,15 @@ class Points:
 
         Args:
             u: velocity of the points along the tangent of the path, shape (m, 2), length per arc length.
-            status: first statuses, shape (m,): -1 or 1 for the sense of sliding, 0 sticking, 2 open (`ContactStatus`).
+            status: statuses with which the search begins, shape (m,): -1 or 1 for sliding against or along the tangent
+                of the tool, 0 sticking, 2 open (`ContactStatus`).
             near: geometry of the tools at the m points.
             force: current contact forces, shape (m, 2).
 
         Returns:
-            Rates of the forces F, shape (m, 2); their part beyond the stiffness S in the factorised tangent, dF - S dx,
-            shape (m, 2); statuses, shape (m,). None if no admissible statuses were found.
+            Rates F of the forces, shape (m, 2). Rates without the part in the factorised tangent, F - S v, shape (m,
+            2): S is the contact stiffness of the points in that tangent, v their velocity. Statuses, shape (m,). None
+            if no admissible statuses were found.
         """
         slack = (status != ContactStatus.FREE) & ~self._pulls
         F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]
@@ -350,8 +359,8 @@ class Points:
         """Return the arc length after which a contact status changes first, with forces linear in the arc length.
 
         Args:
-            status: contact statuses, shape (m,): -1 or 1 for the sense of sliding, 0 sticking, 2 open
-                (`ContactStatus`).
+            status: contact statuses, shape (m,): -1 or 1 for sliding against or along the tangent of the tool, 0
+                sticking, 2 open (`ContactStatus`).
             near: geometry of the tools at the m points.
             force: current contact forces, shape (m, 2).
             rate: derivatives of the forces with respect to arc length, shape (m, 2).

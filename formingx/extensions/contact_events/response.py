@@ -20,8 +20,9 @@ class Response:
     .. math:: \Delta x = V - \dot x \, (n \cdot V), \qquad \Delta\lambda = - \dot\lambda \, (n \cdot V), \qquad
               V = K^{-1} E
 
-    with the tangent K, the path tangent (dx/ds, dlambda/ds) and the normal n of the plane in which an arc-length step
-    ends (`Curve.plane_normal`). The methods return None once the stored LU factors belong to another tangent.
+    K is the tangent dF/dx, :math:`\lambda` the control, and a dot the derivative along the path by arc length. n is the
+    normal of the plane in which an arc-length step ends (`Curve.plane_normal`). The methods return None once the stored
+    LU factors belong to another tangent.
 
     Args:
         curve: path solver (`formingx.solve.arc_length.Curve`) that has just factorised the tangent at the state.
@@ -42,14 +43,16 @@ class Response:
         return self._made == self._newton.solver.count
 
     def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
-        """Return the response to unit forces of sign -1 at contact points, one for each component of each point.
+        """Return the response to unit forces at contact points, one for each component of each point.
+
+        Each force contributes -1 to one component of the residual F at its point.
 
         Args:
             chosen: for each face, local numbers of locally owned points.
 
         Returns:
             Changes of x, locally owned rows, shape (n, m), and of the control, shape (m,). The m columns run over the
-            points of all ranks and their components. None without valid factors.
+            points of all ranks and their components. None if the stored LU factors belong to another tangent.
         """
         return self._solve(unit_forces(self._problem, self._problem.active_contacts, chosen)) if self.is_valid else None
 
@@ -59,12 +62,12 @@ class Response:
         Args:
             x: unknowns at the current iterate, locally owned entries, shape (n,).
             control: load parameter (control) of the current iterate, dimensionless.
-            forces: for each face, contact forces at its points in the residual F, shape (n, 2). NaN where the contact
-                law gives the force.
+            forces: for each face, dimensionless contact forces at its points, added to the residual F, shape (n, 2).
+                At points with NaN the force follows from the contact law.
 
         Returns:
-            Changes of x, locally owned entries, shape (n,), and of the control. None without valid factors or a finite
-            result.
+            Changes of x, locally owned entries, shape (n,), and of the control. None if the result is not finite, or
+            if the stored LU factors belong to another tangent.
         """
         if not self.is_valid:
             return None
@@ -84,8 +87,8 @@ class Response:
     def _solve(self, E: Array) -> tuple[Array, Array] | None:
         """Return the responses of x, shape (n, m), and of the control, shape (m,), to changes E of the residual.
 
-        E: m right-hand sides of the system with the tangent K, as columns, shape (n, m). The result is None if K,
-        updated for a few contact points, is singular.
+        E: m right-hand sides of the system with the tangent K, locally owned rows, as columns, shape (n, m). The result
+        is None if K with the changed stiffness of a few contact points is singular.
         """
         V = self._newton.solve_one_sided(E)
         if V is None:
