@@ -39,8 +39,9 @@ class EventPrediction(Protocol):
 
         Returns:
             For each active contact a tuple of arrays for its n owned points: arc length of the gap closure, shape (n,);
-            position there, relative to the tool, shape (n, 2), length; mask of predicted contact forces, shape (n,);
-            derivative of the position before the closure, shape (n, 2), length. None if the prediction failed.
+            position there, relative to the tool, shape (n, 2), length; mask of points with a
+            predicted contact force, shape (n,); derivative of the position by arc length just before the closure, shape
+            (n, 2), length. None if the prediction failed.
         """
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:

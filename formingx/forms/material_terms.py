@@ -120,7 +120,7 @@ class MaterialTerms:
         return coefficient.at_time(forms.time - (self._time_step / 2 if self._in_middle else 0))
 
     def update_temperature(self) -> None:
-        """Update the constants to a changed temperature.
+        """Update the material constants to a changed temperature of the body.
 
         Raises:
             InputError: a constant has no finite value at a temperature.

@@ -157,7 +157,10 @@ class MidSurface(Formulation):
         return MidSurfaceProbe(problem, points)
 
     def set_stiff(self) -> None:
-        """Set a small stretch in all directions: its tension makes the tangent regular, see `Formulation.set_stiff`."""
+        """Set `w` to a small stretch in all directions, whose tension makes the tangent regular.
+
+        If the tangent is singular in the reference configuration, the path takes its first direction from these fields.
+        """
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X[:self.scene.kinematics.components])
 
     def _make_mesh(self) -> Mesh:

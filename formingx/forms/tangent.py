@@ -57,7 +57,7 @@ class Tangent:
 
         Args:
             rate: derivative of each item's amplitude by the control, then of the process time (`StepData.rate`).
-            assemble: function that returns the locally owned entries of a compiled linear form.
+            assemble: function that assembles a compiled linear form and returns its locally owned entries.
             n: number of locally owned field unknowns.
 
         Returns:

@@ -300,7 +300,7 @@ class Problem(Stages, Units):
             out.array_w += self._stage.unbalanced
 
     def update_temperature(self) -> None:
-        """Update constants and friction to a changed temperature; collective.
+        """Update material constants and coefficients of friction to a changed temperature; collective.
 
         Raises:
             InputError: a constant or friction has no value at a temperature.

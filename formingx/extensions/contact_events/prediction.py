@@ -179,8 +179,9 @@ class ContactEventPrediction:
 
         Returns:
             For each active contact a tuple of arrays for its n owned points: arc length of the gap closure, shape (n,);
-            position there, relative to the tool, shape (n, 2), length; mask of predicted contact forces, shape (n,);
-            derivative of the position before the closure, shape (n, 2), length. None if the prediction failed.
+            position there, relative to the tool, shape (n, 2), length; mask of points with a
+            predicted contact force, shape (n,); derivative of the position by arc length just before the closure, shape
+            (n, 2), length. None if the prediction failed.
         """
         return list(zip(*self._sequence.closures(length), strict=True)) if self._known else None
 
