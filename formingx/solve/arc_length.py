@@ -93,10 +93,11 @@ class Curve(StateSolver):
         Args:
             old: accepted state at the start of the step.
             length: arc length of the step, dimensionless.
-            predictor: function that replaces the guess of x, for a step in time (`Predictor`); None: no such function.
+            predictor: function that returns a guess of x at a control, shape (n,), for a step in time. The guess on the
+                tangent is used if `predictor` is None or returns None, and near limit points.
             earlier: a state before `old` on the same smooth path. The guess then lies on the parabola through both that
                 touches the tangent of `old`. None: the guess lies on the tangent.
-            bend: correction that is added to the guess (`Bend`), or None.
+            bend: correction that is added to the guess: (change of x, shape (n,); change of the control); or None.
 
         Returns:
             The state, of kind "step".
@@ -115,9 +116,11 @@ class Curve(StateSolver):
             old: accepted state at the start of the step.
             length: arc length at which the guess lies, dimensionless.
             equation: the constraint, such as "quantity = target".
-            predictor: function that replaces the guess of x, for a step in time (`Predictor`), or None.
-            earlier: state before `old` whose parabola with `old` gives the guess; None: the guess lies on the tangent.
-            bend: correction that is added to the guess (`Bend`), or None.
+            predictor: function that returns a guess of x at a control, shape (n,), for a step in time. The guess on the
+                tangent is used if `predictor` is None or returns None, and near limit points.
+            earlier: a state before `old` on the same smooth path. The guess then lies on the parabola through both that
+                touches the tangent of `old`. None: the guess lies on the tangent.
+            bend: correction that is added to the guess: (change of x, shape (n,); change of the control); or None.
             kind: kind of the new state (`State.kind`).
 
         Returns:
@@ -132,8 +135,9 @@ class Curve(StateSolver):
                bend: Bend | None = None) -> tuple[Array, float]:
         """Return the guess (x, control) of a step from `old`; x: locally owned entries, shape (n,).
 
-        length: arc length of the step. earlier: state before `old` whose parabola with `old` gives the guess; None: the
-        guess lies on the tangent. bend: correction that is added to the guess, or None.
+        length: arc length of the step. earlier: state before `old`; the guess lies on the parabola through both that
+        touches the tangent of `old`. None: the guess lies on the tangent. bend: correction that is added to the guess:
+        (change of x, shape (n,); change of the control); or None.
         """
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if earlier is not None:
@@ -148,11 +152,11 @@ class Curve(StateSolver):
 
     def _solve_from(self, x: Array, control: float, constraint: Constraint, kind: str, old: State,
                     predictor: Predictor | None) -> State:
-        """Return the state at which a constraint holds, from the guess (x, control), with the `State.kind` "kind".
+        """Return the state at which a constraint holds, solved for from the guess (x, control).
 
-        Away from limit points, the predictor replaces the guess of x, and tangents of earlier iterations are kept. Near
-        a limit point tangents must be new, since limit points are located by the tangents of neighbouring states. old:
-        accepted state at the start of the step.
+        Away from limit points the predictor replaces the guess of x, and chord iterations are allowed. Near a limit
+        point dF/dx must be new. It gives the direction of the path at each state, from which the limit point is
+        located. kind: `State.kind` of the new state. old: accepted state at the start of the step.
         """
         if predictor is None or not self._is_away_from_limit_point(old.slope):
             return self.solve(x, control, constraint, kind, old)
@@ -217,7 +221,8 @@ class Curve(StateSolver):
         Args:
             a: first state.
             b: second state.
-            fraction: position of the plane on the cubic between them, 0 at a, 1 at b.
+            fraction: parameter of the Hermite cubic through (x, control) of both states with their tangents, 0 at a, 1
+                at b. The plane goes through the point of the cubic with this parameter.
 
         Returns:
             The state, of kind "step".
@@ -229,7 +234,7 @@ class Curve(StateSolver):
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
     def state_at_target(self, a: State, b: State, quantity: Quantity, target: Target) -> State:
-        """Return the state between two states that meets a target, as `state_at_value` with an error for the user.
+        """Return the state between two states that meets a target.
 
         Args:
             a: first state.
@@ -241,7 +246,7 @@ class Curve(StateSolver):
             The state, of kind "target".
 
         Raises:
-            ConvergenceError: no such state was found.
+            ConvergenceError: no such state was found. Its message tells the user how to set the target before the run.
         """
         try:
             return self.state_at_value(a, b, quantity, target.value)

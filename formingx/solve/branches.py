@@ -41,13 +41,16 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
 
 
 def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
-    """Return the pairs of neighbouring states between which another path branches off, see `branch_points`.
+    """Return the pairs of neighbouring states between which another path branches off.
+
+    Between them the determinant of dF/dx changes its sign, and the control has no limit point. For a problem with
+    history variables the list is empty.
 
     Args:
         curve: solver of the path.
         states: the states of the path, in order.
-        sign: function that returns the sign of the determinant of the tangent at a state, from `determinant_sign`. It
-            is called only if no state has an orientation.
+        sign: function that factorises dF/dx at a state and returns the sign of its determinant. It is called only if no
+            state stores this sign (`State.orientation`), at few states.
 
     Returns:
         Pairs (state before the branch point, state after it).
@@ -58,10 +61,10 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
 
 
 def _follow_from_states(curve: Curve, states: Sequence[State]) -> bool:
-    """Return True if branch points are found without further factorisations.
+    """Return True if the data of the states give the branch points, so no dF/dx has to be factorised for them.
 
-    This is so if the states have a `State.orientation`, the sign of the determinant of the tangent. For a problem with
-    history variables no branch points are sought.
+    This is so if a state has a `State.orientation`, from which the sign of the determinant of dF/dx follows. It is also
+    so for a problem with history variables, where no branch points are sought.
     """
     return curve.problem.has_history or any(state.orientation for state in states)
 

@@ -78,8 +78,8 @@ class Columns:
         """Return the motions of contact points for each of the m right-hand sides, shape (k, m), length.
 
         Args:
-            moved: function that returns the k components of the motions for an update of unknowns and control
-                (`Moved`).
+            moved: linear function of updates of the unknowns, shape (n, m), and of the control, shape (m,). It returns
+                the k components of the motions relative to the tools, shape (k, m).
         """
         return np.asfortranarray(moved(self._values, self.steps))         # a column of each force in one piece
 
@@ -104,7 +104,9 @@ class Columns:
 
 
 class CondensedColumns:
-    """Solutions of the bordered system for right-hand sides that are zero in most rows; members as in `Columns`.
+    """Solutions of the bordered system for m right-hand sides that are zero in most rows.
+
+    The bordered system is K dx = E for the tangent K, with the constraint of the step as a further row.
 
     Only the entries of K^-1 in the nonzero rows of the right-hand sides are computed. They give the solutions in these
     rows, and so the motions of contact points that depend on no other unknowns. One solution with the transposed K
@@ -113,12 +115,12 @@ class CondensedColumns:
     Args:
         solver: solver with the factors of the tangent K.
         E: right-hand sides as columns, shape (n, m).
-        border: border of the system, the constraint of the arc length.
+        border: border of the system, from the constraint of the step.
         inverse: entries of K^-1 in `rows` and in the columns of the same numbers, shape (k, k).
         rows: numbers of the rows in which a right-hand side is not zero, shape (k,).
 
     Attributes:
-        steps: changes of the control, shape (m,).
+        steps: change of the control for each right-hand side, shape (m,).
     """
 
     def __init__(self, solver: DirectSolver, E: Array, border: BorderedTangent, inverse: Array, rows: Array):
@@ -133,8 +135,8 @@ class CondensedColumns:
         """Return the motions of contact points for each of the m right-hand sides, shape (k, m), length.
 
         Args:
-            moved: function that returns the k components of the motions for an update of unknowns and control
-                (`Moved`).
+            moved: linear function of updates of the unknowns, shape (n, m), and of the control, shape (m,). It returns
+                the k components of the motions relative to the tools, shape (k, m).
         """
         V = np.zeros((self._border.b.getLocalSize(), self._found.shape[1]))
         V[self._rows] = self._found
@@ -168,16 +170,18 @@ class CondensedColumns:
 
 
 def columns(solver: DirectSolver, E: Array, border: Border) -> Columns | CondensedColumns:
-    """Return the solutions of the bordered system for m right-hand sides, condensed if this costs less.
+    """Solve the bordered system for m right-hand sides, by entries of K^-1 if this costs less than m full solutions.
+
+    The bordered system is K dx = E for the tangent K, with the constraint of the step as a further row.
 
     Args:
         solver: solver with the factors of the tangent K.
         E: right-hand sides as columns, locally owned rows, shape (n, m).
-        border: function that maps solutions with K to the bordered system; a `BorderedTangent` if the solutions may be
-            condensed.
+        border: function that maps solutions with K to the bordered system, in place. Entries of K^-1 are used only if
+            it is a `BorderedTangent`.
 
     Returns:
-        The solutions.
+        The solutions: an object with `motions`, `update` and `updates`, which evaluate linear combinations of them.
     """
     worthwhile = len(E) >= CONDENSATION.min_rows and E.shape[1] >= CONDENSATION.min_columns
     if isinstance(border, BorderedTangent) and worthwhile:

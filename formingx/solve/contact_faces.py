@@ -15,7 +15,7 @@ class Tractions(Protocol):
 
     Attributes:
         force: tractions, shape (n, c), stress.
-        sense: direction of sliding along the tangent of the tool, 1 or -1; 0 for other points; shape (n,).
+        sense: direction of sliding along the tangent of the tool, 1 or -1; 0 for points that do not slide; shape (n,).
         stiffness: derivative of `force` with respect to the position of its point, shape (n, c, c), stress/length.
         status: `ContactStatus` of each point, shape (n,).
     """
@@ -67,23 +67,31 @@ class Increment(Protocol):
         """
 
     def in_ramp(self, points: Array) -> Callable[[Array], tuple[Array, Array]]:
-        """Return a function that maps further motions of m points, shape (m, c), length, to (depth, path).
+        """Return a function that predicts the depth of m points in the contact ramp after a motion.
 
-        A motion is relative to the tool, since the last linearisation. With the half-width theta of the ramp, the depth
-        is 0 at the signed distance -theta and 1 at theta, shape (m,). The path is the normal times 2 theta, shape (m,
-        c), length; 0 for points that slide, adhere or have no friction.
+        Its argument is the motion of the points relative to the tool since the last linearisation, shape (m, c),
+        length. It returns two arrays. The first is the depth, shape (m,): 0 at the signed distance -theta from the
+        tool, where contact begins, and 1 at theta. The second is the normal of the tool times the width 2 theta of the
+        ramp, shape (m, c), length. The second is 0 for sliding points, and without friction or with adhesion.
+
+        points: numbers of the points, shape (m,).
         """
 
     def expect(self, points: Array, sense: Array) -> None:
-        """Set the direction of sliding, `sense`, shape (n,), that the next iteration assumes at a mask of points."""
+        """Set the direction of sliding that the next linearisation assumes at some points.
+
+        points: mask of these points among the n points, shape (n,). sense: direction of sliding along the tangent of
+        the tool, 1 or -1, or 0 for sticking; shape (n,). Entries outside the mask are not used.
+        """
 
 
 class ContactFace(Protocol):
     """Face of the body in contact, with n locally owned points.
 
     Attributes:
-        points: reference positions of the contact points, shape (n, c).
-        rule: quadrature rule of the face (`formingx.contact.rule.Rule`).
+        points: reference positions of the contact points, shape (n, c), length.
+        rule: quadrature rule of the face (`formingx.contact.rule.Rule`). It interpolates displacements at the contact
+            points, and adds their forces to the residual.
     """
 
     points: Array
@@ -101,7 +109,8 @@ class ContactFace(Protocol):
         """Set contact forces that act in F in place of the contact law, shape (n, c); None: the law acts."""
 
     def relative_motion(self, dx: Array, step: Array | float) -> Array:
-        """Return the motion of the points relative to their tool, shape (points, c), length, in an update.
+        """Return the motion of the n points relative to their tool due to an update, shape (n, c), length.
 
-        dx: update of the unknowns, locally owned entries; several are columns. step: update of the control.
+        dx: update of the unknowns, locally owned entries, shape (m,). step: update of the control. For k updates dx has
+        the shape (m, k), step the shape (k,) and the result the shape (n, c, k).
         """

@@ -20,7 +20,7 @@ from .state import State
 
 @dataclass(frozen=True)
 class Limits:
-    """Limits of numbers of the last good state, beyond which they indicate a cause of the failure.
+    """Limits that separate causes of a failure from harmless values, for numbers of the last good state.
 
     Attributes:
         states_before: number of states between the last good state and the earlier state with which its condition
@@ -77,18 +77,19 @@ class Diagnosis:
         aimed: value of the controlled quantity, in the user's units, at the end of the failed attempt.
         residual: {"displacement", "pressure", "multipliers": norm of this part of the residual over the norm of the
             support forces} in the failed attempt; inf where it was not finite.
-        worst: place of the largest out-of-balance force in the failed attempt.
+        worst: `Place` (R and Z in the reference configuration, layer, nearest boundary and its distance) of the largest
+            out-of-balance force in the failed attempt.
         smallest_J: smallest det F at the quadrature points of the last good state.
-        at_J: place of `smallest_J`.
+        at_J: place of `smallest_J`, a `Place`.
         failed_J: smallest det F at the quadrature points in the failed attempt.
-        at_failed_J: place of `failed_J`.
+        at_failed_J: place of `failed_J`, a `Place`.
         shape: smallest shape quality of a deformed element of the last good state, over its value in the reference
             configuration.
         shortened: (mean stretch, (R, Z) of one end, (R, Z) of the other) of the longest piece of a sheet compressed
             along its section.
         I1: largest (I1 - 3) / (limit - 3) in the last good state, with the limit of the material at each point; None
             without a limit.
-        limit: place of `I1`.
+        limit: place of `I1`, a `Place`.
         turned: pairs of values of the controlled quantity, in the user's units, between which the determinant of the
             tangent changed its sign without a limit point.
         limit_points: values of the controlled quantity at the limit points of the path, in the user's units.
@@ -163,7 +164,9 @@ class Diagnosis:
         return "\n".join(lines)
 
     def picture(self, file: Any) -> None:
-        """Draw the last good state: the deformed elements coloured by J, the worst places marked, and the tools.
+        """Draw the last good state: the deformed elements coloured by J, and the tools.
+
+        Marks show the points of smallest J, of the largest out-of-balance force, and nearest to a material's limit.
 
         Args:
             file: name of the image file; rank 0 writes it.
@@ -253,7 +256,8 @@ def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """Return {field of `Diagnosis`: value} for the fields that follow from the tangents of the states.
 
     These fields are the condition numbers, the sign changes of the determinant of dF/dx, and the limit points. The
-    control at a limit point ahead is extrapolated linearly from the squared slopes of the last two states.
+    squared derivative of the control with respect to arc length is linear in the control near a limit point. Its values
+    in the last two states are extrapolated to 0: this gives the control at a limit point ahead.
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
@@ -381,8 +385,10 @@ def _branch_findings(run: FailedRun) -> Iterator[Finding]:
 
 
 def _singular(facts: dict[str, Any]) -> bool:
-    """Return True if the condition number of the tangent has grown by the factor `Limits.singular_ratio` over the last
-    states.
+    """Return True if the condition number of the tangent has grown by more than the factor `Limits.singular_ratio`.
+
+    It is compared with the number `Limits.states_before` states earlier. facts: {field of `Diagnosis`: value}, with
+    both numbers as "condition" and "condition_before" if they were computed.
     """
     before = facts.get("condition_before")
     return bool(before and (facts.get("condition") or 0) > _LIMITS.singular_ratio * before)

@@ -65,7 +65,8 @@ class ProblemState(Protocol):
         x: the unknowns, locally owned entries, shape (n,), dimensionless.
         control: load parameter (control), dimensionless.
         time: process time.
-        history_variables: history variables of the problem after this state.
+        history_variables: history variables of the problem after this state, an entry for each history of the problem
+            (contacts, materials, temperature).
         setting: step data, as a dict of the fields of `StepData`; empty for a problem without stages.
     """
 
@@ -77,16 +78,19 @@ class ProblemState(Protocol):
 
 
 class Viscosity(Protocol):
-    """Viscous forces eta V dx of a body: V is the matrix of a viscous stress with viscosity 1, eta the viscosity."""
+    """Viscous forces eta V dx of a body in a change dx of the unknowns.
+
+    V is the matrix of a viscous stress with viscosity 1, and eta the viscosity over the shear modulus.
+    """
 
     def forces(self, change: Array, eta: float) -> Array:
         """Return the viscous forces eta V dx, locally owned entries, shape (n,).
 
-        change: change dx of the unknowns, shape (n,). eta: viscosity, dimensionless. V: matrix of the body.
+        change: change dx of the unknowns, locally owned entries, shape (n,). eta: viscosity over the shear modulus.
         """
 
     def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
-        """Add eta V to a tangent matrix in place, with the matrix V of the body and the viscosity eta."""
+        """Add eta V to a tangent matrix in place; eta: viscosity over the shear modulus."""
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
@@ -112,7 +116,8 @@ class Examined(Protocol):
     """Examination of a body in its last good state and in a failed attempt.
 
     Attributes:
-        facts: {field of `Diagnosis`: value}.
+        facts: {name of a field of `Diagnosis`: value}, such as the smallest J, residuals and the number of nodes in
+            contact.
     """
 
     facts: dict[str, Any]
@@ -154,13 +159,15 @@ class Residual(Protocol):
         Args:
             x: unknowns at which the derivative is taken.
             control: control at which it is taken.
-            one_sided: True for the one-sided derivative towards the next step, where F has a kink at an accepted state.
+            one_sided: True if the next step starts at (x, control). Where F has a kink, the derivative is then taken on
+                the side to which this step goes.
         """
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, one_sided: bool = False) -> None:
         """Compute dF/dcontrol, the derivative of the residual F at (x, control), in `out`.
 
-        one_sided: True for the derivative towards the next step, where F has a kink at an accepted state.
+        one_sided: True if the next step starts at (x, control). Where F has a kink, the derivative is then taken on the
+        side to which this step goes.
         """
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
@@ -231,10 +238,11 @@ class ActiveSet(Protocol):
         """
 
     def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Return for each face the change of contact stiffness per area at an accepted state (x, control).
+        """Return for each face the difference of two contact stiffnesses per area at an accepted state (x, control).
 
-        It is the stiffness in the derivative towards the next step, minus the stiffness in the tangent of the last
-        iteration, for n points with c components, shape (n, c, c), stress/length.
+        Where F has a kink, the stiffness at the start of the next step differs from the one in the tangent last
+        computed. The first minus the second is returned, for n points with c components, shape (n, c, c),
+        stress/length.
         """
         return []
 
@@ -243,7 +251,8 @@ class Histories(Protocol):
     """History variables and process time, on which F may depend besides x and the control.
 
     Attributes:
-        history_variables: history variables after the last accepted state.
+        history_variables: history variables after the last accepted state, an entry for each history of the problem
+            (contacts, materials, temperature).
         clock: process time at control 0.
     """
 
@@ -283,13 +292,14 @@ class Histories(Protocol):
 
         Args:
             past: k accepted states; the step begins at the last of them.
-            share: weights of `past` and of x whose sum is the displacement halfway in time, shape (k + 1,).
-            x: unknowns at the end of the step, locally owned entries.
+            share: weights of the unknowns of `past` and of x, shape (k + 1,). Their weighted sum interpolates the
+                unknowns at the middle of the step in time.
+            x: unknowns at the end of the step, locally owned entries, shape (n,).
             control: load parameter (control) at the end of the step, dimensionless.
 
         Returns:
-            Relative error of the stress at the end of the step; the part of it that is left after relaxation at
-            constant deformation for a time of the same length as the step.
+            Relative error of the stress at the end of the step, and its persistent part. That part remains if the
+            body then relaxes at constant deformation for another duration of the step.
         """
         return 0.0, 0.0
 
@@ -304,8 +314,8 @@ class Stages(Protocol):
     def enter(self, setting: StepData, x: Array, control: float) -> None:
         """Set new step data, for a path that begins at (x, control); x: locally owned entries, shape (n,).
 
-        Constrained unknowns have their values in x at this control. With `StepData.fading` the unbalanced forces at (x,
-        control) decrease to 0 along the path.
+        The prescribed values of constrained unknowns start from their values in x. If `setting.fading` is True, the
+        unbalanced forces at (x, control) decrease to 0 as the control goes to 1.
         """
 
     def restore(self, state: ProblemState) -> None:
@@ -315,7 +325,9 @@ class Stages(Protocol):
         """Return a context in which the problem has the unknowns, step data and history variables of a state."""
 
     def activate(self, number: int, x: Array, control: float) -> None:
-        """Activate the item with a number in the scene at (x, control), with new history variables.
+        """Activate an item of the scene at (x, control); a contact begins with new history variables.
+
+        number: index of the item in `Scene.items`.
 
         Raises:
             InputError: a tool would be activated inside the body.
@@ -363,7 +375,10 @@ class Units(Protocol):
         return "the equations are not defined there"
 
     def examine(self, last: ProblemState | None, attempt: Attempt | None) -> Examined | None:
-        """Return the examination of the last good state and of a failed attempt; None without a body. Collective."""
+        """Examine the body in the last good state and in a failed attempt, to find causes of the failure; collective.
+
+        The result holds numbers, such as the smallest J, and draws the body. It is None for equations without a body.
+        """
         return None
 
 

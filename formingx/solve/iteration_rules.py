@@ -22,19 +22,19 @@ class Newton:
             It holds for contact with history variables in a step that is repeated with a smaller length if it fails.
         small_correction: size of a correction (dimensionless displacement) below which growing corrections are no sign
             of divergence while the active set changes.
-        exempt_iterations: number of iterations that do not count in `newton.Tolerances.settling`, of those whose small
-            correction led to a new active set. For example, a hundred points of a slack sheet separate one by one from
-            a flat plug. With history variables all iterations count.
-        max_cycles: number of returns to an earlier active set at which the iteration counts as cycling. Converged
-            iterations took up to 4.
+        exempt_iterations: largest number of iterations that do not count in `newton.Tolerances.settling`. Each is an
+            iteration whose small correction led to a new active set. For example, a hundred points of a slack sheet
+            separate one by one from a flat plug. With history variables all iterations count.
+        max_cycles: number of returns to an earlier active set at which the iteration counts as cycling. Iterations that
+            converged had up to 4 returns.
         divergence_correction: relative correction above which three corrections in a row mean divergence, with contact
             or without. In converged iterations they stayed below 0.1.
         uncorrected_iteration: index of the iteration, counted from 0, in which the local contact problem is never
             solved. The full correction often removes the errors of the iteration before it.
         max_chords: number of chord iterations that together cost less than one iteration with a new tangent. A chord
             iteration takes a residual and a solve, about a sixth of the time.
-        max_residual_ratio: ratio of the residuals after and before an iteration, above which a tangent is not kept.
-            Round-off could be mistaken for slower convergence.
+        max_residual_ratio: residual after an iteration over the residual before it, above which the tangent matrix is
+            not kept. A larger ratio may come from round-off instead of slow convergence.
     """
 
     force_floor: float = 1e-5
@@ -97,9 +97,11 @@ class ModifiedNewton:
     """Rule of the modified Newton method: a tangent is kept while chord iterations cost less than a new one.
 
     Source: Ortega and Rheinboldt 1970, section 7.1. Let q be the residual after an iteration over the residual before
-    it. The q expected of the next chord iteration is the q of the last iteration. The first iteration of a step may use
-    the tangent of an earlier state. Its expected q is the q of the last first iteration that used an earlier tangent,
-    halved for each step since then. Earlier tangents are thus tried again after some steps.
+    it. A chord iteration is expected to have the q of the iteration before it.
+
+    The first iteration of a step may use the tangent matrix of an earlier state. Let q_0 be its q in the last step that
+    began so. The expected q is q_0, halved for each step since then. Earlier matrices are thus tried again after some
+    steps.
 
     Args:
         settings: settings of Newton's method.

@@ -21,10 +21,11 @@ class JumpRules:
         curve: solver of the path.
         targets: targets of the run.
         settings: settings of snap-through.
-        rule: rule at limit points, as `at_limit_points` returns; "" until it is known.
+        rule: rule at limit points: "continue", "continue_volume" (snap where the enclosed volume has a maximum),
+            "snap_through" or "stop"; "" until it is known.
 
     Attributes:
-        rule: the rule at limit points.
+        rule: the argument `rule`; a run sets it at its start.
         change: change of the control in the next snap-through, dimensionless. It is 10 times larger after each
             snap-through, and returns to its first value after a step along the path.
         no_equilibrium_at: control at which a snap-through reached no equilibrium, dimensionless; NaN without one.
@@ -36,7 +37,7 @@ class JumpRules:
 
     @property
     def allowed(self) -> bool:
-        """True if the body may snap through: by the rule at limit points, or where a kink of F may end the path.
+        """True if `rule` lets the body snap through, or if it is "continue" and the path may end at a kink of F.
 
         The residual F has kinks in contact, and where history variables change.
         """
@@ -130,7 +131,8 @@ def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
     Args:
         curve: solver of the path.
         old: the state.
-        at_limit_point: the rule at limit points, as `at_limit_points` returns.
+        at_limit_point: the rule at limit points. With "snap_through" the body snaps where the control reverses, with
+            "continue_volume" where the enclosed volume reverses, too; with other rules it never snaps here.
         sense: 1 or -1, direction of the control at the start of the run.
 
     Returns:

@@ -23,13 +23,13 @@ class _Scaling(IntEnum):
 
 @dataclass(frozen=True)
 class Condensation:
-    """Smallest sizes of a linear system for which the zeros of its right-hand sides save time in MUMPS.
+    """Sizes of a linear system from which MUMPS is faster if it uses the zeros of sparse right-hand sides.
 
     Attributes:
         min_columns: number of right-hand sides from which a few entries of the inverse matrix cost less than full
             solutions (`CondensedColumns`).
         min_rows: number of unknowns from which entries of the inverse are used. Right-hand sides are given to MUMPS as
-            sparse columns if there are at least this many unknowns for each nonzero entry.
+            sparse columns if their number of entries is at least this multiple of their number of nonzero entries.
     """
 
     min_columns: int = 12
@@ -197,7 +197,7 @@ class DirectSolver:
     def _dense(self, n: int, m: int) -> list[PETSc.Mat]:
         """Return two dense matrices, for right-hand sides and solutions, with n locally owned rows and m columns.
 
-        Both are kept for the next call with the same m. Of numbers of columns above 2, only the last one is kept.
+        Both are kept for the next call with the same m. For m > 2 they are destroyed at the first call with a new m.
         """
         if m not in self._columns:
             for other in [width for width in self._columns if width > 2]:

@@ -97,7 +97,8 @@ class FixedControl:
 class FixedControlCurve(Curve):
     """Solver for states at given values of the control, by PETSc SNES, for paths without limit points.
 
-    Lengths of steps and of tangents are changes of the control in place of arc lengths.
+    Arc length is replaced by the change of the control. The length of a step is the change of the control in it, and
+    the path tangent (dx, dcontrol) of a state has dcontrol = 1 or -1.
     """
 
     fixed_control = True
@@ -145,12 +146,16 @@ class FixedControlCurve(Curve):
         self._fixed.destroy()
 
     def unit_slope(self, state: State) -> float:
-        """Return the derivative of the control with respect to arc length at a state."""
+        """Return the derivative of the control at a state with respect to true arc length, which includes changes of x.
+        """
         self._a.array_w[:] = state.direction
         return state.slope / self.norm(self._a, state.slope)
 
     def plane_normal(self, state: State) -> Array:
-        """Return zeros, shape (n,): steps end at a fixed control, on a plane whose equation is independent of x."""
+        """Return the derivative of control - target with respect to x: zeros, shape (n,).
+
+        A step ends where this constraint is 0.
+        """
         return np.zeros(len(state.x))
 
     def _length_of(self, b: PETSc.Vec) -> float:
@@ -158,7 +163,8 @@ class FixedControlCurve(Curve):
         return 1.0
 
     def _inner(self, x: Array, control: float, y: Array, other: float) -> float:
-        """Return the product of the changes of the control in two changes (x, control) and (y, other)."""
+        """Return control * other, the inner product of two changes (x, control) and (y, other); x and y do not count.
+        """
         return control * other
 
     def _correct(self, old: State, length: float, kind: str) -> State:

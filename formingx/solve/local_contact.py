@@ -41,8 +41,9 @@ class LocalContact:
         max_iterations: largest number of iterations of the local solve.
         full_corrections: number of full corrections at the start, which may cycle. In later corrections sticking points
             stop near the outer edge of the ramp. If a point slides, a correction that increases the residual is halved.
-        max_halvings: largest number of halvings of a correction, which would stall at a kink.
-        kept_depth: if a correction would move a point out of the ramp, the point stops at this fraction of its depth.
+        max_halvings: largest number of halvings of a correction. More halvings would stall at a kink of the law.
+        kept_depth: if a correction would move a point out of the ramp, the point stops at this fraction of the depth
+            that it had in the ramp before the correction.
         min_depth: depth in the ramp, over its width, below which a point may leave the ramp.
         entry_depth: depth in the ramp, over its width, at which a point stops when it enters the ramp again.
         entry_growth: factor of `entry_depth` from one entry to the next.
@@ -122,10 +123,11 @@ class LocalSolve:
         return step + step_correction
 
     def _mark_further(self, dx: Array, step: float) -> bool:
-        """Mark the points whose status would change in a Newton update; return True if a rank has new ones.
+        """Mark the points whose status would change in a Newton update, for the next local solve.
 
-        Marked points take part in the local solve. The sense of sliding that the next linearisation assumes at them is
-        set, too. dx: update of x, locally owned entries, shape (n,). step: update of the control.
+        The direction of sliding that the update gives to marked points is stored for the next linearisation. dx: update
+        of x, locally owned entries, shape (n,). step: update of the control. Return True if any rank marked a new
+        point.
         """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
@@ -148,11 +150,12 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
     Args:
         problem: the equations.
         changes: for each contact, changes of the stiffness per area of its points, shape (n, c, c), stress/length.
-        solver: solver with the LU factors of the tangent.
+        solver: solver with the LU factors of the tangent K.
 
     Returns:
-        The function (`Update`). None if more points change than `LocalContact.max_changes`: another factorisation then
-        costs less.
+        Function (V, step) that returns V for the changed tangent, or None if this tangent is singular. V is K^-1 E with
+        step 0, or dx/dcontrol with step 1; locally owned rows, shape (n, m). None instead of a function if more points
+        change than `LocalContact.max_changes`: another factorisation then costs less.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = combined(problem.comm, sum(map(len, chosen)), MPI.SUM)
@@ -191,8 +194,8 @@ def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: lis
 class _Points:
     """A few contact points of all ranks, with the compliance of the body at these points.
 
-    Unless called locally owned, an array has the components of the points of all ranks one after the other, shape (m,).
-    Such an array is called flat.
+    There are k points with c components on all ranks. An array of the shape (k c,) has the components of the points one
+    after the other, in the order of ranks, faces and points.
 
     Args:
         problem: the equations.
@@ -256,23 +259,23 @@ class _Points:
         return None
 
     def _stop_at_edge(self, ramps: list[Any], y: Array, new: Array, entry_depth: Array) -> tuple[Array, bool]:
-        """Stop corrections of motions at the outer edge of the ramp.
+        """Shorten a correction of motions that moves points into or out of the ramp, at the outer edge of the ramp.
 
         The stiffness of a sticking point decreases with the slope of the ramp, to zero at its outer edge. A point that
         is pulled along its tool and hardly pressed is in equilibrium close to this edge. Full corrections would move it
         out of the ramp and back again, without end.
 
         Args:
-            ramps: for each face, function of motions that returns the depths of its points in the ramp and the vectors
-                through the ramp along the normal (`Increment.in_ramp`).
-            y: motions before the correction, flat, length.
-            new: motions after the correction, flat, length.
-            entry_depth: depth in the ramp, over its width, at which each point stops when it enters the ramp, shape
-                (points,). It is changed in place: it grows for points that enter.
+            ramps: for each face, a function of the motions of its p points, shape (p, c). It returns their depths over
+                the width of the ramp, shape (p,), and the normals times this width, shape (p, c).
+            y: motions of all k points before the correction, shape (k c,), length.
+            new: motions after the full correction, shape (k c,), length.
+            entry_depth: depth over the width of the ramp at which each point stops when it enters the ramp, shape (k,).
+                It is changed in place: it grows for points that enter.
 
         Returns:
-            Motions after the correction, flat. True if a point was stopped or all points stick: the correction must
-            then not be halved, since the residual may increase on the way.
+            Motions after the shortened correction, shape (k c,). True if a point was stopped or all points stick: the
+            correction must then not be halved, since the residual may increase on the way.
         """
         (before, _), (depth, path) = (self._gather_pairs(self._at_faces(ramps, z), (), (self._c,)) for z in (y, new))
         leaves, enters = (before > _LOCAL.min_depth) & (depth <= 0), (before <= 0) & (depth > 0)
@@ -283,15 +286,16 @@ class _Points:
         return new + back.ravel(), bool(back.any() or path.any(axis=1).all())
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
-        """Return solutions updated to changed stiffnesses of the points, by Woodbury's formula.
+        """Return solutions for a tangent with other contact stiffnesses than K, by Woodbury's formula.
 
         Args:
             V: solutions K^-1 E, or dx/dcontrol, locally owned rows, shape (n, m).
             step: change of the control in V: 0 for K^-1 E, 1 for dx/dcontrol.
-            changes: for each face, changes of the stiffness per area of its points, shape (k, c, c), stress/length.
+            changes: for each face, changes of the stiffness per area of its p owned points, shape (p, c, c),
+                stress/length.
 
         Returns:
-            The updated solutions, shape (n, m), or None if the changed tangent is singular.
+            The solutions for the changed tangent, shape (n, m), or None if this tangent is singular.
         """
         added = self._gather(np.concatenate(changes))
         y = self._with_added_stiffness(added, self._gather(self._moved(V, np.full(V.shape[1], step))))
@@ -301,10 +305,11 @@ class _Points:
         return V - self._columns.updates(self._scale[:, None] * forces)
 
     def _with_added_stiffness(self, added: Array, y: Array) -> Array | None:
-        """Return (1 + C S)^-1 y: the motions y of the points, reduced by additional stiffnesses S; None if singular.
+        """Return (1 + C S)^-1 y, shape as y: the motions of the k points if stiffnesses S are added; None if singular.
 
-        C is the compliance of the body at the k points, with c components each. added: their stiffnesses S, shape (k,
-        c, c). y: motions, shape (k c,), or several as columns.
+        C is the compliance of the body at the points, shape (k c, k c) for c components; it maps tractions to motions.
+        added: stiffness S of each point, shape (k, c, c), stress/length. y: motions without S, shape (k c,) or, for
+        m solutions, (k c, m).
         """
         n = len(y)
         J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), added).reshape(n, n)
@@ -315,49 +320,51 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: Array, step: Array | float) -> Array:
-        """Return the motion of locally owned points relative to their tools, flat, length; collective.
+        """Return the motions of the p locally owned points relative to their tools, shape (p c,), length; collective.
 
-        dx: update of the locally owned unknowns, shape (n,). step: update of the control. Several updates are columns
-        of dx, shape (n, k), and of the result.
+        dx: update of the locally owned unknowns, shape (n,). step: update of the control. For m updates dx has the
+        shape (n, m), step the shape (m,) and the result the shape (p c, m).
         """
         motions = (c.relative_motion(dx, step)[i] for c, i in zip(self._contacts, self._chosen))
         return np.concatenate([motion.reshape(-1, *dx.shape[1:]) for motion in motions])
 
     def _linearised(self) -> tuple[Array, Array]:
-        """Return forces and stiffnesses of the k points in the last linearisation of the contact law.
+        """Return the tractions, shape (k c,), and stiffnesses, shape (k, c, c), of all k points in the last iteration.
 
-        Forces are flat; stiffnesses have the shape (k, c, c) for c components.
+        They are the values of the contact law at which it was linearised.
         """
         return self._forces([c.increment.last_tractions(i) for c, i in self._some])
 
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
-        """Return the contact forces, flat, and stiffnesses, shape (k, c, c), of all k points after a motion.
+        """Return the tractions, shape (k c,), and stiffnesses, shape (k, c, c), of all k points after a motion.
 
-        laws: for each face a function from motions of its points to their tractions. y: motions relative to the tools
-        since the last linearisation, with c components for each point, flat, length.
+        laws: for each face, a function that maps motions of its p owned points, shape (p, c), to their `Tractions`.
+        y: motions of all points relative to their tools since the last linearisation, shape (k c,), length.
         """
         return self._forces([(tractions.force, tractions.stiffness) for tractions in self._at_faces(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-        """Gather forces and stiffnesses of the k points of all ranks: forces, flat; stiffnesses, shape (k, c, c).
+        """Gather the tractions, shape (k c,), and stiffnesses, shape (k, c, c), of the k points of all ranks.
 
-        parts: for each face the forces, shape (points, c), and stiffnesses, shape (points, c, c), of its owned points.
+        parts: for each face, tractions, shape (p, c), and stiffnesses, shape (p, c, c), of its p owned points.
         """
         force, stiffness = self._gather_pairs(parts, (self._c,), (self._c, self._c))
         return force.ravel(), stiffness
 
     def _at_faces(self, functions: list[Any], y: Array) -> list[Any]:
-        """Return for each face the value of its function at the motions of its locally owned points.
+        """Evaluate a function of each face at the motions of its p locally owned points; return the list of results.
 
-        functions: function of each face. y: motions of the points of all ranks, flat, length.
+        functions: for each face, a function of motions, shape (p, c). y: motions of the k points of all ranks, shape
+        (k c,), length.
         """
         owned = y[self._own].reshape(-1, self._c)
         return [f(owned[part]) for f, part in zip(functions, self._parts, strict=True)]
 
     def _gather_pairs(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
-        """Gather both values of a pair at the points of all faces and ranks, shape (points, *shape) each.
+        """Return two arrays of values at the k points of all faces and ranks, shape (k, *shape) each; collective.
 
-        parts: the pair of each face, for its owned points. shapes: shapes of both values at one point.
+        parts: for each face, two arrays of values at its p owned points, shape (p, *shape) each. shapes: `shape` of the
+        first and of the second value at one point.
         """
         found = zip(*parts) if parts else ([np.zeros((0, *shape))] for shape in shapes)
         return [self._gather(np.concatenate(part)) for part in found]

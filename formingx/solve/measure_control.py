@@ -30,13 +30,13 @@ class QuantitySteps:
     Attributes:
         max_step_ratio: multiple of the step length. A step ends at the next time to be met exactly if this time lies
             within this multiple, so that no short step is left over.
-        max_cutback: largest factor by which the length of a step is reduced when the step is repeated.
-        min_control_change: relative change of the control in a step, below which the control counts as constant. Also
-            the arc length of a step, below which no limit point is sought in it.
+        max_cutback: largest ratio of the lengths of a repeated step and of the rejected step before it.
+        min_control_change: relative change of the control in a step, below which the control counts as constant. No
+            limit point is sought in a step whose arc length is below the same number.
         time_tolerance: tolerance of the time of a limit point, over the duration of its step.
         target_tolerance: relative tolerance of a target that is met inside a step.
-        min_contact_fraction: fraction of a step up to which the closure of gaps must admit it (`StepLimit.length`). A
-            step that is admitted for a smaller fraction fails.
+        min_contact_fraction: a step fails if too many gaps would close before this fraction of its length. The number
+            of gaps that may close in one step is set by the contacts (`StepLimit.length`).
     """
 
     max_step_ratio: float = 1.5
@@ -128,9 +128,10 @@ class QuantityRun(Run):
         return new
 
     def _limit_before(self, old: State, new: State) -> State:
-        """Return the state in time between `old` and `new` at which the control has an extremum; `new` without one.
+        """Return the state at which the control has an extremum, at a time between `old` and `new`.
 
-        Corners of the amplitude, and round-off of a constant control, do not count as extrema.
+        The state is solved for in one step from `old`. Without an extremum `new` is returned. Corners of the amplitude,
+        and round-off of a constant control, do not count as extrema.
         """
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
@@ -171,9 +172,10 @@ class QuantityRun(Run):
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _on_tangent(self, old: State, value: float) -> tuple[Array, float]:
-        """Return the point (x, control) on the tangent of `old` at which the prescribed quantity has a value.
+        """Return the point (x, control) on the path tangent of `old` at which the prescribed quantity has a value.
 
-        value: the value, in the user's units. Without such a point nearby, (x, control) of `old` is returned.
+        value: the value, in the user's units. The point is sought within an arc length of about 1 from `old`, in both
+        directions. If there is none, (x, control) of `old` is returned.
         """
         def deviation(s: float) -> float:
             return self.curve.value(self._quantity, old.x + s * old.direction, old.control + s * old.slope) - value
@@ -188,8 +190,7 @@ class QuantityRun(Run):
         return old.x, old.control
 
     def _met_before(self, old: State, new: State) -> State:
-        """Return the first state in time, after `old` and up to `new`, that meets an open target; `new` if none does.
-        """
+        """Return the earliest state after `old` and up to `new` that meets an open target; `new` if none does."""
         problem, best = self.problem, new
         for target, quantity in self.targets.open:
             if target.name == "process_time":

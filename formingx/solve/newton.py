@@ -35,10 +35,10 @@ def relative(equations: Residual, forces: float, floor: float = Newton.force_flo
 class Iteration(NamedTuple):
     """Residual and correction of one Newton iteration.
 
-    The last entry of a list of iterations has the residual of the converged state, and no correction.
+    The last entry of a list of iterations has the residual of the converged state; its correction and work are 0.
 
     Attributes:
-        residual: |F| before the iteration, relative to the support forces (`relative`).
+        residual: |F| before the iteration over |support forces| + `Newton.force_floor`.
         correction: ``|dx|/(|x| + Newton.displacement_floor)``, criterion (3.5.1) of Song (1993).
         work: |F . dx| over its value in the first iteration, criterion (3.5.2) of Song (1993).
         chord: True if the tangent of an earlier iteration was used.
@@ -67,11 +67,11 @@ class Failure(Exception):
 
     Args:
         reason: the reason, as text.
-        history: the Newton iterations.
+        history: residual and correction of each Newton iteration before the failure (`Iteration`); may be empty.
 
     Attributes:
         reason: the reason, as text.
-        history: the Newton iterations.
+        history: the argument `history`.
         attempt: unknowns and last corrections at the end of the iteration; None if no iteration failed.
     """
 
@@ -88,10 +88,10 @@ class Tolerances:
     Attributes:
         correction: tolerance of the relative correction ``|dx|/(|x| + Newton.displacement_floor)`` that quadratic
             convergence predicts for the next iteration.
-        residual: tolerance of the norm of F relative to the support forces (`relative`).
+        residual: tolerance of ``|F|/(|support forces| + Newton.force_floor)``.
         iterations: largest number of iterations with the same active set of contact.
-        settling: largest number of iterations while the active set changes. Of iterations whose small correction led
-            to a new active set, `Newton.exempt_iterations` do not count.
+        settling: largest number of iterations while the active set changes. Iterations whose small correction led to a
+            new active set do not count, up to `Newton.exempt_iterations` of them.
 
     Raises:
         InputError: a value that is not greater than 0.
@@ -127,8 +127,8 @@ class Tolerances:
         After a chord iteration only the first condition counts.
 
         Args:
-            corrections: relative corrections of all iterations so far.
-            residuals: relative residuals before each iteration and after the last one.
+            corrections: corrections of all iterations so far, ``|dx|/(|x| + Newton.displacement_floor)``.
+            residuals: residuals before each iteration and after the last one, ``|F|/(|support forces| + floor)``.
             chord: True if the last iteration was a chord iteration. Its convergence is linear: the next correction is
                 predicted from the last ratio of residuals or corrections, and doubled.
             smooth: True if F has no kinks, between which an iteration could oscillate.
@@ -161,13 +161,13 @@ class Drag(Protocol):
     """
 
     def forces(self, x: Array) -> Array:
-        """Return the forces.
+        """Return the forces that are added to F at the unknowns x.
 
         Args:
             x: unknowns, locally owned entries, shape (n,).
 
         Returns:
-            Forces that are added to F, locally owned entries, shape (n,).
+            Dimensionless forces, locally owned entries, shape (n,).
         """
 
     def add_to(self, tangent: PETSc.Mat) -> None:
@@ -226,12 +226,12 @@ class BorderedNewton:
             self._limited = False
 
     def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> bool:
-        """Compute the tangent of the path at a solution of F = 0: the vector `b` = dx/dcontrol, with new factors.
+        """Factorise dF/dx at a solution of F = 0, and store dx/dcontrol along the path in the vector `b`.
 
         Args:
             x: unknowns of the solution.
             control: load parameter (control) of the state, dimensionless.
-            one_sided: True for the one-sided derivatives of F towards the next step, where F has a kink.
+            one_sided: True if the next step starts here. At a kink of F, derivatives are taken on its side.
 
         Returns:
             False if dF/dx is singular.
@@ -245,8 +245,8 @@ class BorderedNewton:
     def _factorise(self, x: PETSc.Vec, control: float, one_sided: bool = False, rescale: bool = True) -> bool:
         """Factorise dF/dx at (x, control) and compute `F_control`; return False if dF/dx is singular.
 
-        one_sided: True for the one-sided derivatives towards the next step, where F has a kink. rescale: True for a new
-        scaling of rows and columns by MUMPS.
+        one_sided: True if the next step starts here. At a kink of F, derivatives are taken on its side.
+        rescale: True for a new scaling of rows and columns by MUMPS.
         """
         matrix = self.problem.tangent(x, control, one_sided)
         if self._drag:
@@ -258,18 +258,17 @@ class BorderedNewton:
         return good
 
     def update_one_sided(self, x: PETSc.Vec, control: float) -> bool:
-        """Update the vector `b` = dx/dcontrol at a converged solution to the next step, without a factorisation.
+        """Update `b` = dx/dcontrol at a converged solution for the start of the next step, without a factorisation.
 
-        Where F has a kink, its one-sided derivative towards the next step differs from the factorised tangent. The
-        difference is the stiffness of a few contact points, such as those whose gap has just closed. Woodbury's formula
-        adds it.
+        At a kink of F, dF/dx on the side of the next step differs from the factorised matrix. The difference is the
+        stiffness of a few contact points, such as those whose gap has just closed. Woodbury's formula adds it.
 
         Args:
             x: unknowns of the solution.
             control: load parameter (control) of the state, dimensionless.
 
         Returns:
-            False if too many points change, or the updated tangent is singular.
+            False if too many points change, or the updated dF/dx is singular; `b` is then unchanged.
         """
         update = woodbury(self.problem, self.problem.one_sided_changes(x, control), self.solver)
         found = update and update(self.b.array_r[:, None], 1.0)
@@ -279,13 +278,13 @@ class BorderedNewton:
         return True
 
     def solve_one_sided(self, E: Array) -> Array | None:
-        """Return K^-1 E for the tangent K towards the next step, which `tangent` or `update_one_sided` computed last.
+        """Return K^-1 E with the matrix K = dF/dx that the last call of `tangent` or `update_one_sided` computed.
 
         Args:
             E: right-hand sides as columns, locally owned rows, shape (n, m).
 
         Returns:
-            Solutions K^-1 E, locally owned rows, shape (n, m); None if the updated tangent is singular.
+            Solutions K^-1 E, locally owned rows, shape (n, m); None if K is singular.
         """
         V = self.solver.solve_all(E)
         return self._update(V, 0.0) if self._update else V
@@ -359,7 +358,7 @@ class BorderedNewton:
             self._residual(x, control)
 
     def _residual(self, x: PETSc.Vec, control: float) -> None:
-        """Compute the residual `F` at (x, control), with the added forces (`Drag`)."""
+        """Compute `F` = F(x, control), plus the forces of the `Drag` (such as viscous forces) if there is one."""
         self.problem.residual(x, control, self.F)
         if self._drag:
             self.F.array_w += self._drag.forces(x.array_r)
@@ -404,10 +403,10 @@ class BorderedNewton:
         return bool(np.isfinite(self.b.norm()))
 
     def _correction(self, x: PETSc.Vec, control: float, constraint: Constraint, history: list[Iteration]) -> float:
-        """Return the correction of the control by the linearised constraint, and add it times `b` to the correction
-        `a`.
+        """Return the correction of the control from the linearised constraint, and correct the vector `a` in place.
 
-        history: iterations so far, which a failure stores.
+        `a` = -K^-1 F is the correction of x at constant control. The correction of the control times `b` = dx/dcontrol
+        is added to it. history: iterations so far, which a failure stores.
 
         Raises:
             Failure: the constraint does not change along the path.

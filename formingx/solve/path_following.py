@@ -138,7 +138,7 @@ class Run:
 
     @property
     def _target_is_control(self) -> bool:
-        """False if the last target is a process time, but the control of the run does not change with time."""
+        """True unless the last target is a process time and no time passes as the control of the run changes."""
         return self.targets.until.name != "process_time" or bool(self.problem.setting.rate[-1])
 
     @property
@@ -183,7 +183,7 @@ class Run:
         return kept
 
     def _elapsed(self) -> float:
-        """Return the time since the last call, s."""
+        """Return the wall time since the last call, or since the start of the run, s."""
         before, self._began = self._began, time.perf_counter()
         return self._began - before
 
@@ -198,9 +198,9 @@ class Run:
     def _next_states(self, old: State) -> list[State]:
         """Return the states of the next step from `old`, in order; the last one is its end, or a target within reach.
 
-        A failure halves the step. A snap-through is tried if the path leads back, if short steps fail, or if the
-        smallest step has failed. Short steps do not trigger it at a first state with history variables, nor near the
-        control at which an earlier snap-through reached no equilibrium.
+        A failure halves the step. A snap-through is tried where the rule at limit points demands it at `old`, or if the
+        smallest step has failed. It may also be tried after two failures, if the step is short. This is not done at a
+        first state with history variables, nor near the control of an earlier snap-through without equilibrium.
         """
         first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
@@ -291,7 +291,10 @@ class Run:
 
     @property
     def _predictor(self) -> Predictor | None:
-        """Function from the control to a guess of x, extrapolated in time; None without relaxation or with kinks."""
+        """Function that returns a guess of x at a control, from the polynomial in time through the last states.
+
+        None unless the material relaxes, time passes with the control, and the residual F has no kinks.
+        """
         if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.has_kinks:
             return None
 
@@ -314,9 +317,10 @@ class Run:
         return error
 
     def _snap(self, old: State) -> list[State]:
-        """Snap through from the state `old`, at which the path leads back; return a list with the new state.
+        """Snap through from a state at which the control (or the enclosed volume) reverses along the path.
 
-        If a body with constant loads reaches no equilibrium, the list is empty and the run ends.
+        Return a list with the new state. If a body with constant loads reaches no equilibrium, the list is empty and
+        the run ends.
         """
         work_sign = self._sense * (self._jumps.rule == "continue_volume")
         if old.kind != "limit point":

@@ -15,12 +15,12 @@ def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers:
             clocked: bool = True) -> tuple[list[float], list[float], float]:
     """Return step data in which the amplitude of one load, support or contact is the control.
 
-    All other amplitudes stay constant. With the control lambda, an amplitude is base + rate lambda.
+    All other amplitudes stay constant. An amplitude is base + rate * control.
 
     Args:
         amplitudes: current amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
         scales: value of each in the user's units at amplitude 1, in the same order.
-        numbers: index of the controlled one in `Scene.items`, then of the others that move with it.
+        numbers: indices in `Scene.items` of the controlled item and of the other contacts of the same tool.
         stage: the stage, whose speed or duration relates the process time to the control.
         clocked: True if process time may pass while the control changes.
 
@@ -47,8 +47,8 @@ def table_step_data(amplitudes: list[float], scales: Sequence[float], tables: li
              then: float) -> tuple[list[float], list[float]]:
     """Return step data between two times, between which all tables are linear.
 
-    The control is 0 at the first time and proportional to the time since. At the second time the control equals the
-    largest change of an amplitude, or 1 if no amplitude changes. An amplitude is base + rate lambda.
+    The control is proportional to the time since `now`, where it is 0. At the time `then` it equals the largest change
+    of an amplitude since `now`, or 1 if no amplitude changes. An amplitude is base + rate * control.
 
     Args:
         amplitudes: current amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.

@@ -144,7 +144,7 @@ class Execution:
         return self.problem.setting, last.x if last else self._unloaded, last.control if last else 0.0
 
     def _present_value(self, number: int) -> float:
-        """Return the current value of the item with a number in the scene, in the user's units."""
+        """Return the current value of an item, in the user's units; number: index of the item in `Scene.items`."""
         setting, _, control = self._present()
         return setting.amplitude(number, control) * self.problem.scales[number]
 
@@ -181,11 +181,11 @@ class Execution:
         self.record.complete_step(StepControl(), change_completed())
 
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
-        """Follow the path until the last target is met, and return the targets that are still open.
+        """Follow the path until the last target is met; return the pairs (target, output quantity) that are still open.
 
-        targets, result: pairs (target, output quantity). control: value of the control at the current state, where the
-        run starts; None: continue an interrupted run. requested: another target that ends the run if it is met before
-        the last one, or None.
+        targets: pairs (target, output quantity). control: value of the control at the current state, where the run
+        starts; None: continue an interrupted run. requested: another target that ends the run if it is met before the
+        last one, or None.
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
@@ -231,7 +231,8 @@ class Execution:
     def _run_control(self, numbers: list[int], begun: bool) -> None:
         """Run a stage in which the amplitude of one load, support or contact is the control.
 
-        numbers: its index in `Scene.items`, then the indices of items that move with it. begun: True to continue it.
+        numbers: indices in `Scene.items` of this item and of the other contacts of the same tool. begun: True to
+        continue the stage.
         """
         control = None if begun else self._enter_control(numbers)
         self._trace(self._open_targets(), control)
@@ -239,8 +240,8 @@ class Execution:
     def _enter_control(self, numbers: list[int], clocked: bool = True) -> float:
         """Set step data in which the amplitude of a load, support or contact is the control; return its current value.
 
-        numbers: its index in `Scene.items`, then the indices of items that move with it. clocked: True if process time
-        may pass while the control changes.
+        numbers: indices in `Scene.items` of this item and of the other contacts of the same tool. clocked: True if
+        process time may pass while the control changes. The current value is dimensionless.
         """
         base, rate, control = control_step_data(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
@@ -257,10 +258,10 @@ class Execution:
         return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
     def _prescribe(self, numbers: list[int], begun: bool) -> None:
-        """Run a stage in which one load or tool is adjusted so that another quantity follows an amplitude in time.
+        """Run a stage in which a load or tool is adjusted so that an output quantity follows an amplitude in time.
 
-        numbers: its index in `Scene.items`, then the indices of other items with the same amplitude.
-        begun: True to continue the run.
+        The quantity and its amplitude are `Stage.prescribed`, or the target `Stage.constant`. numbers: indices in
+        `Scene.items` of the load or of all contacts of the tool. begun: True to continue the stage.
         """
         control = None if begun else self._enter_control(numbers, clocked=False)
         target, amplitude, times = self._prescribed_amplitude(self.problem.setting.base[-1])

@@ -117,8 +117,8 @@ class RunTargets:
 
         Args:
             start: the state, changed in place.
-            first: True for the unloaded state. Its tangent is kept if the target has no sign (`Target.signed`), since
-                such a target may be reached in both directions.
+            first: True for the unloaded state. If the target is a quantity such as a stretch, whose sign does not
+                change with the control (`Target.signed`), both directions may reach it. The tangent is then kept.
         """
         if self.until.signed or not first:
             left, rate = self._curve.target_residual(self.quantity, self.until.value, start)
@@ -225,7 +225,8 @@ class Progress:
         Args:
             gained: progress of the run, from 0 at the start to 1 at the target.
             states: number of states so far.
-            length: length of the next step, as `StepControl.length`.
+            length: length of the next step, dimensionless: an arc length, or a fraction of the duration of a
+                `QuantityRun`.
         """
         self._gained, self._states, self._length = gained, states, length
         if self._bar is not None:
@@ -239,7 +240,8 @@ class Progress:
 
         Args:
             reason: the reason, as text.
-            length: length of the next attempt, as `StepControl.length`.
+            length: length of the next attempt, dimensionless: an arc length, or a fraction of the duration of a
+                `QuantityRun`.
         """
         self._limits[reason] += 1
         self._length = length
@@ -251,7 +253,7 @@ class Progress:
             self._bar.close()
 
     def _log_progress(self) -> None:
-        """Log the progress if the last line is at least the processor time `silence` ago."""
+        """Log a line on the progress if the run took `silence` seconds of processor time since the last line."""
         now = time.process_time()
         if not self._here or now - self._said < self.silence:
             return

@@ -192,7 +192,8 @@ class Record:
         Args:
             step: control of the step length (`StepControl`) of the next step.
             until: the target that ends the run.
-            entries: further data to store in `State.stepping`.
+            entries: further data {name: value} to store in `State.stepping`, from which the run continues: numbers,
+                lists and dicts that a checkpoint can hold.
         """
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               "column": self.equations.shown(0.0)[0].replace(" ", "_"), **entries}

@@ -36,11 +36,11 @@ class SnapThrough:
     """Criteria for snap-through, and settings of the viscous motion to the next equilibrium state.
 
     The viscosity eta, over the shear modulus, begins low and grows to the smallest value that gives a solution. With
-    low viscosity the motion ends at a near equilibrium. High viscosity slows the body while contact opens, and slip
-    changes the final state meanwhile. Where contact is about to open, two equilibria may be near, and the result
-    depends on eta. The dissipated energy depends on the distance moved in a viscous solution. With friction, so does
-    the final state. Both effects are measured in tests/test_jumps.py. Distances are root mean squares of the
-    displacement over the size of the body. Forces are relative to the support forces.
+    low viscosity the motion ends at a near equilibrium. High viscosity slows the body: it slips along its tools for
+    longer before contact opens, and slip changes the final state. Where contact is about to open, two equilibria may be
+    near, and the result depends on eta. The dissipated energy depends on the distance moved in a viscous solution. With
+    friction, so does the final state. Both effects are measured in tests/test_jumps.py. Distances are root mean squares
+    of the displacement over the size of the body. Forces are relative to the support forces.
 
     Attributes:
         lengths: arc lengths, decreasing. A step that fails twice below one of them is replaced by a snap-through, once
@@ -62,8 +62,8 @@ class SnapThrough:
         min_distance: smallest distance that the body should move in a viscous solution.
         max_distance: largest distance that the body should move in a viscous solution.
         distance_ratio: distance that the body should move in a viscous solution, over the distance moved so far.
-        repetition_ratio: limit of the distance moved in the first viscous solution, over the distance that the body
-            should move. Above this limit the solution is repeated with more viscosity.
+        repetition_ratio: distance moved in the first viscous solution, over the distance that the body should move,
+            above which the solution is repeated with more viscosity.
         max_solutions: number of viscous solutions after which the snap-through has failed. Where a sheet is drawn over
             an edge point by point, hundreds of solutions are needed.
         max_total_distance: distance moved after which the snap-through has failed.
@@ -97,16 +97,17 @@ class SnapThrough:
     equilibrium_force: float = 1e-10
 
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
-        """Return the step lengths below which the second failure of a step triggers a snap-through.
+        """Return the step lengths at which a run tries a snap-through after two failures.
 
-        These are all `lengths`. If all contacts with friction stick, it is the last one alone, since a shorter step
-        then succeeds and no snap-through is needed before.
+        These are all `lengths`. If all contacts with friction stick, it is the smallest length alone, since shorter
+        steps then succeed without a snap-through.
 
         Args:
             limit: limits of a step by contact, or None.
 
         Returns:
-            Arc lengths, dimensionless, in decreasing order. A step tries one snap-through below each of them.
+            Arc lengths, dimensionless, in decreasing order. If steps shorter than one of them fail, one snap-through is
+            tried for it.
         """
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
@@ -204,8 +205,8 @@ class _Motion:
         """Solve F(x) + eta V (x - origin) = 0, and take the solution as the new position unless it is rejected.
 
         V is the matrix of a viscous stress with viscosity 1. A solution is rejected if Newton's method fails, an
-        element is inverted, a point passes through a tool or the body moves back. The first solution is also rejected
-        if the body moves too far.
+        element is inverted, a point passes through a tool, or the work of the controlled load has the wrong sign. The
+        first solution is also rejected if the body moves further than `SnapThrough.repetition_ratio` allows.
 
         Args:
             origin: unknowns from which the body moves, locally owned entries, shape (n,).
@@ -289,15 +290,15 @@ class _Motion:
         return bool(self._work_sign) and self.curve.work(a, b) * self._work_sign < 0
 
     def _add_dissipation(self, a: Array, x: Array, pull: Array) -> None:
-        """Add the work of the unbalanced forces in a motion to the dissipated energy, by the trapezoidal rule.
+        """Add the work of the viscous forces in a motion to `dissipated`, by the trapezoidal rule with one interval.
 
-        Forces halfway are not used, since the straight line between the positions may pass through tools. Negative work
-        of the force at the start is left out, since viscous forces do no negative work.
+        More intervals are not used, since the straight line between the positions may pass through tools. Negative work
+        of the force at the start is left out, since viscous forces dissipate energy.
 
         Args:
             a: unknowns at the start of the motion, locally owned entries, shape (n,).
-            x: unknowns at the end of the motion.
-            pull: unbalanced forces at the end of the motion, dimensionless.
+            x: unknowns at the end of the motion, shape (n,).
+            pull: viscous forces eta V (x - origin) at the end of the motion, dimensionless, shape (n,).
         """
         dx = x - a
         self.dissipated += 0.5 * (max(self._sum(self._pull * dx), 0.0) + self._sum(pull * dx))

@@ -47,7 +47,8 @@ class Stage:
         constant: with `control` and `duration`: a target, such as `force(2.0)`. The control is adjusted so that the
             target stays met.
         step: step control of this stage; default: the step control of the run.
-        at_limit_point: rule where the control has a limit point, one of `AT_LIMIT_POINT`, as in `formingx.trace`.
+        at_limit_point: rule where the control has a limit point. "continue": follow the path beyond it.
+            "snap_through": jump to the next equilibrium. "stop": end the run. None: the default of `formingx.trace`.
 
     Raises:
         InputError: no target, both `control` and `amplitudes`, a table that goes back in time, an argument not allowed.
@@ -97,7 +98,10 @@ class Stage:
 
     @property
     def highest(self) -> Target | None:
-        """Target with the largest value in the table that a quantity follows (`prescribed`); None without a table."""
+        """Target of the output quantity that the stage prescribes, with the largest value in its table of amplitudes.
+
+        None if the stage prescribes no output quantity, or prescribes it by a function of time.
+        """
         if self.prescribed is None or callable(self.prescribed[1]):
             return None
         return self.prescribed[0](float(np.max(self.prescribed[1][:, 1])))
@@ -167,13 +171,14 @@ class Stage:
         return make_target, amplitude
 
     def _tables(self, amplitudes: Any) -> list[tuple[Any, Array]]:
-        """Return the tables that the user gave as amplitudes.
+        """Return the tables that the user gave as amplitudes, as arrays.
 
         Args:
-            amplitudes: {item: [(time, value), ...]}.
+            amplitudes: {item: [(time, value), ...]}. An item is a load, support or contact or its name; with `control`,
+                a function that makes targets.
 
         Returns:
-            [(item, knots (time, value), shape (n, 2))].
+            [(key of `amplitudes`, knots (time, value) in the user's units, shape (n, 2))].
 
         Raises:
             InputError: the argument is not of this form, or its times do not increase.
@@ -199,14 +204,16 @@ class Stage:
 
 
 class Plan(NamedTuple):
-    """Stage with the items of the scene given by their numbers.
+    """Plan of a stage: the loads, supports and contacts that it names, as indices in `Scene.items`.
 
     Attributes:
         stage: the stage.
-        numbers: numbers of the controlled item, then of the items that move with it; empty without `Stage.control`.
-        tables: [(number of the item, knots (time, value), shape (n, 2))] of `Stage.amplitudes`.
-        inactive: numbers of the inactive items.
-        names: all items of the scene, as text, in the order of their numbers.
+        numbers: indices of the controlled item and of the other contacts of the same tool, ascending; empty without
+            `Stage.control`.
+        tables: [(index of the item, knots (time, value), shape (n, 2))] of the argument `amplitudes` of the stage; a
+            tool has an entry for each of its contacts.
+        inactive: indices of the inactive items, ascending.
+        names: all items of the scene, as text, in the order of `Scene.items`.
     """
 
     stage: Stage
@@ -228,14 +235,14 @@ class Plan(NamedTuple):
 
 
 def plan(scene: Scene, stage: Stage) -> Plan:
-    """Return a stage with the items of its scene given by their numbers.
+    """Return the plan of a stage: the loads, supports and contacts that it names, as indices in `Scene.items`.
 
     Args:
         scene: the scene.
         stage: the stage.
 
     Returns:
-        The plan of the stage.
+        The plan, with the controlled and inactive items and the tables.
 
     Raises:
         InputError: an item cannot be controlled or is missing in the scene, the body is free to move, or a target

@@ -19,17 +19,20 @@ class State:
         direction: derivative of x with respect to arc length, locally owned entries, shape (n,).
         slope: derivative of the control with respect to arc length; (direction, slope) is the unit tangent of the path.
         measures: {name: value} of the output quantities, in the user's units.
-        history: the Newton iterations of the solution for this state (`formingx.solve.newton.Iteration`).
+        history: `formingx.solve.newton.Iteration` (residual, correction, work, chord) of each Newton iteration of the
+            solution for this state. The last entry is the residual of the converged state.
         kind: "start", "step", "target", "limit point" or "jump" (the body snapped to this state).
         jump: of a "jump": {"dissipated": energy lost in the snap-through (stress length^3), "moved": displacement from
-            the state before, mean over the volume of the body (length)}.
+            the state before, root mean square over the volume of the body (length)}.
         target: the target that the state meets exactly, or None.
-        history_variables: history variables of the problem after this state (`Problem.histories`).
-        history_variables_before: history variables with which the state was solved for; empty in a loaded path.
+        history_variables: history variables of the problem after this state, an entry for each history of the problem
+            (contacts, materials, temperature).
+        history_variables_before: history variables with which the state was solved for, in the same order; empty in a
+            loaded path.
         stage: name of the stage of a process.
         setting: step data of the stage, as a dict of the fields of `StepData`.
-        stepping: data with which a run continues after this state: its next step, its counts and its target; empty for
-            a state inside a step.
+        stepping: {name: data} with which a run continues after this state: its step control, its counts and its target;
+            empty for a state inside a step.
         time: process time.
         orientation: sign of det(dF/dx) times the sign of the slope; 0 if it is not known. It is constant along a path,
             also through limit points, and changes its sign where another path branches off.

@@ -46,14 +46,17 @@ class StateSolver:
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: PETSc.Vec, control: float) -> float:
-        """Return the arc length of a change.
+        """Return the arc length of a change (dx, dcontrol) along a straight line.
+
+        It is the root of the mean squared displacement, over the squared size of the body, plus w dcontrol^2 with the
+        weight w = `control_weight`.
 
         Args:
-            x: change of the unknowns.
+            x: change dx of the unknowns.
             control: change of the load parameter (control), dimensionless.
 
         Returns:
-            Length of the straight line, dimensionless.
+            Length, dimensionless.
         """
         return float(np.sqrt(self.problem.inner(x, x) + self.control_weight * control**2))
 
@@ -151,8 +154,9 @@ class StateSolver:
             control: guess of the load parameter (control), dimensionless.
             constraint: the constraint, such as control = 0.1.
             kind: kind of the new state (`State.kind`).
-            before: accepted state before the guess; the tangent of the new state points away from it.
-            chords: True to allow tangents of earlier iterations, see `BorderedNewton.correct`.
+            before: accepted state before the guess; the path tangent of the new state points away from it.
+            chords: True to allow chord iterations, which use the factorised dF/dx of an earlier iteration. They are
+                used only if F has no kinks.
 
         Returns:
             The state, with the tangent of the path.
@@ -215,13 +219,15 @@ class StateSolver:
             self._one_sided_state = state, self.newton.solver.count
 
     def factorise_one_sided(self, state: State) -> bool:
-        """Factorise the one-sided tangent dF/dx towards the next step, unless it was factorised last.
+        """Factorise dF/dx for a step from an accepted state, unless this matrix was factorised last.
+
+        At a kink of F the derivative is taken on the side of the step.
 
         Args:
             state: the accepted state.
 
         Returns:
-            False if the tangent is singular.
+            False if the matrix is singular.
         """
         if self._one_sided_state != (state, self.newton.solver.count):
             self._x.array_w[:] = state.x
@@ -256,7 +262,8 @@ class StateSolver:
             state: the state.
 
         Returns:
-            (c, dc/ds), scaled as `Quantity.equation` scales the constraint; s is the arc length.
+            (c, dc/ds); s is the arc length. c is 0 at the target; only the ratio of both values has a meaning, since
+            each quantity scales its constraint by a factor of its own.
         """
         self._a.array_w[:], self._b.array_w[:] = state.x, state.direction
         left, by_control = quantity.equation(target)(self._a, state.control, self.newton.gradient)
@@ -274,17 +281,17 @@ class StateSolver:
         return state.slope
 
     def work_rate(self, state: State) -> float:
-        r"""Return the work of the controlled load along the tangent of a state, per unit of control and of arc length.
+        r"""Return the rate of work of the controlled load along the path, for a unit of the control.
 
         .. math:: -\frac{\partial F}{\partial \lambda} \cdot \frac{dx}{ds}
 
         F is the residual, lambda the control and s the arc length, all dimensionless.
 
         Args:
-            state: the state.
+            state: the state, at whose tangent dx/ds the rate is taken.
 
         Returns:
-            Work, dimensionless. For a pressure it is in proportion to the derivative of the enclosed volume with
+            Rate of work, dimensionless. For a pressure it is proportional to the derivative of the enclosed volume with
             respect to arc length.
         """
         self._x.array_w[:] = state.x
@@ -293,9 +300,12 @@ class StateSolver:
         return -float(self.newton.F_control.dot(self._b))
 
     def work(self, a: State, b: State) -> float:
-        """Return the work of the controlled load between two states, per unit of control, by the trapezoidal rule.
+        r"""Return the work of the controlled load from state a to state b, for a unit of the control.
 
-        The integrand is -(dF/dcontrol) . dx, as in `work_rate`.
+        .. math:: -\frac{1}{2} \left(\left.\frac{\partial F}{\partial \lambda}\right|_a +
+            \left.\frac{\partial F}{\partial \lambda}\right|_b\right) \cdot (x_b - x_a)
+
+        This is the trapezoidal rule with one interval. F is the residual, lambda the control, both dimensionless.
 
         Args:
             a: first state.

@@ -26,12 +26,13 @@ class StepControl:
 
     .. math:: s_{k+1} = s_k \min\left(\max\left(\frac{n_{target}}{n_k}, \frac{1}{2}\right), growth\right)
 
-    With a time integration error e, relative to its tolerance, the factor is at most 0.9 e^(-1/3).
+    Step k has the arc length s_k and took n_k Newton iterations with a new tangent matrix; n_target is `target`. If the
+    time integration error of the step is e times its tolerance, the factor of s_k is at most 0.9 e^(-1/3).
 
     Attributes:
-        length: length of the next step (dimensionless arc length: mean displacement over the size of the body); at most
-            `largest`.
-        target: number of Newton iterations with a new tangent that a step should take.
+        length: arc length of the next step, at most `largest`. It is dimensionless: about the root mean square of the
+            displacement over the size of the body.
+        target: number of Newton iterations with a new tangent matrix that a step should take.
         growth: largest factor of the length from one step to the next, at least 1. A failure halves the length.
         smallest: step length below which a run gives up.
         largest: largest step length.
@@ -89,7 +90,7 @@ def allowed(caller: str, accuracy: str | float) -> float:
 
     Args:
         caller: name of the calling function, for messages.
-        accuracy: a key of `ACCURACY`, or the relative error itself, between 0 and 1.
+        accuracy: "draft", "standard" or "fine" (`ACCURACY`), or the relative error itself, between 0 and 1.
 
     Returns:
         The relative error of stress and thickness.
