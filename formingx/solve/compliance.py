@@ -24,7 +24,7 @@ updates are columns: it maps the shapes (n, m) and (m,) to (k, m)."""
 
 @dataclass(frozen=True)
 class BorderedTangent:
-    r"""Border of the linear system of F = 0 with a constraint c = 0, as a function (`Border`).
+    r"""Border of the linear system of F = 0 with a constraint c = 0, as a function.
 
     It maps a solution V = K^-1 E with the tangent K to the solution (V', dlambda) of the bordered system:
 
@@ -64,7 +64,8 @@ class Columns:
     Args:
         solver: solver with the factors of the tangent K.
         E: right-hand sides as columns, locally owned rows, shape (n, m).
-        border: function that maps solutions with K to the bordered system (`Border`).
+        border: function that maps solutions K^-1 E, shape (n, m), to the bordered system in place. It returns the
+            changes of the control, shape (m,).
 
     Attributes:
         steps: change of the control for each right-hand side, shape (m,).

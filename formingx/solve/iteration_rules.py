@@ -125,7 +125,7 @@ class ModifiedNewton:
 
         Args:
             setting: current step data. A tangent with other step data is not kept.
-            allowed: True if earlier tangents may be used in this step.
+            allowed: True if factorised tangent matrices of earlier iterations may be used in this step.
         """
         self._allowed, self._first = allowed, True
         self._fall = self._before if self._setting is setting else 1.0
@@ -147,7 +147,7 @@ class ModifiedNewton:
         """Note the convergence of an iteration.
 
         Args:
-            chord: True if the iteration used an earlier tangent.
+            chord: True if the iteration used the factorised tangent matrix of an earlier one.
             fall: residual after the iteration over the residual before it.
         """
         if self._allowed and self._first:

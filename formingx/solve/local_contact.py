@@ -101,7 +101,8 @@ class LocalSolve:
             solver: solver with the LU factors of the tangent K.
             dx: update of x, changed in place.
             step: update of the control.
-            border: function that maps solutions with K to the bordered system (`Border`).
+            border: function that maps solutions K^-1 E, shape (n, m), to the bordered system in place. It returns the
+                changes of the control, shape (m,).
 
         Returns:
             The new update of the control.
@@ -202,7 +203,8 @@ class _Points:
         contacts: the faces in contact.
         chosen: for each face, local numbers of owned points.
         solver: solver with the LU factors of the tangent K.
-        border: function that maps solutions with K to the bordered system (`Border`).
+        border: function that maps solutions K^-1 E, shape (n, m), to the bordered system in place. It returns the
+            changes of the control, shape (m,).
     """
 
     def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],

@@ -55,7 +55,7 @@ class QuantityRun(Run):
 
     Args:
         record: record of the states.
-        quantity: the prescribed output quantity (`Quantity`).
+        quantity: the prescribed output quantity.
         amplitude: function of time that returns the prescribed value of the quantity, in the user's units.
         times: times that are met exactly: the start, the corners and the end of the amplitude.
         targets: pairs (target, output quantity) to meet on the way.
@@ -162,8 +162,8 @@ class QuantityRun(Run):
     def _predicted(self, old: State, time: float, value: float) -> tuple[Array, float]:
         """Return a guess (x, control) of the state at a time, for a step from `old`.
 
-        The guess lies on the polynomial through the last states. If there is only one, the guess lies on its tangent,
-        where the quantity has the prescribed `value` (user's units).
+        The guess lies on the polynomial in time through the last states. If there is only one, the guess lies on its
+        path tangent, at the point where the quantity has the prescribed `value` (user's units).
         """
         past = predictor.recent_states(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:

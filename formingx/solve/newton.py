@@ -179,7 +179,7 @@ class Drag(Protocol):
 
 
 class BorderedNewton:
-    """Newton's method for F(x, control) = 0 together with a constraint c(x, control) = 0 (`Constraint`).
+    """Newton's method for F(x, control) = 0 together with a constraint c(x, control) = 0.
 
     Args:
         problem: the equations.
@@ -231,7 +231,8 @@ class BorderedNewton:
         Args:
             x: unknowns of the solution.
             control: load parameter (control) of the state, dimensionless.
-            one_sided: True if the next step starts here. At a kink of F, derivatives are taken on its side.
+            one_sided: True if the next step starts here. At a kink of F, derivatives are then taken on the side to
+                which this step goes.
 
         Returns:
             False if dF/dx is singular.
@@ -245,8 +246,8 @@ class BorderedNewton:
     def _factorise(self, x: PETSc.Vec, control: float, one_sided: bool = False, rescale: bool = True) -> bool:
         """Factorise dF/dx at (x, control) and compute `F_control`; return False if dF/dx is singular.
 
-        one_sided: True if the next step starts here. At a kink of F, derivatives are taken on its side.
-        rescale: True for a new scaling of rows and columns by MUMPS.
+        one_sided: True if the next step starts here. At a kink of F, derivatives are then taken on the side to which
+        this step goes. rescale: True for a new scaling of rows and columns by MUMPS.
         """
         matrix = self.problem.tangent(x, control, one_sided)
         if self._drag:
@@ -301,7 +302,7 @@ class BorderedNewton:
             control: guess of the load parameter (control), dimensionless.
             constraint: the constraint c.
             old: last accepted state, at which contact increments start; None for the first state.
-            chords: True to allow tangents of earlier iterations (`ModifiedNewton`), if F has no kinks.
+            chords: True to allow chord iterations, which use the factors of an earlier dF/dx, if F has no kinks.
 
         Returns:
             Control of the solution; list of the iterations.
@@ -390,7 +391,7 @@ class BorderedNewton:
         """Compute the correction `a` = -K^-1 F with the tangent K at (x, control); return False if K is singular.
 
         The vector `b` = dx/dcontrol is computed, too, except with a `Drag` and in a chord iteration. chord: True to use
-        the factors of an earlier tangent. rescale: True for a new scaling of rows and columns by MUMPS.
+        the factors of an earlier dF/dx. rescale: True for a new scaling of rows and columns by MUMPS.
         """
         if not chord and not self._factorise(x, control, rescale=rescale):
             return False
@@ -433,7 +434,7 @@ def fixed(target: float) -> Constraint:
         target: value of the control, dimensionless.
 
     Returns:
-        The constraint (`Constraint`).
+        Function (x, control, gradient) that returns (c, dc/dcontrol) and sets `gradient` to dc/dx.
     """
     def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
         gradient.set(0)

@@ -157,7 +157,7 @@ class Run:
         return [*self._turned, *self.record.states[self._first + len(self._turned):]]
 
     def _continue(self, may_turn: bool) -> dict[str, Any]:
-        """Continue the run of the last states of the record; return the data stored with its last step.
+        """Continue the run that added the last states to the record; return the data stored with its last step.
 
         These data (`State.stepping`) are the step control, the counts and the target of the run, {} without them.
         may_turn: True if the run may go back along the path to a new target. The target must not be a pressure, which
