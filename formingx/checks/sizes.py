@@ -259,7 +259,8 @@ def _limit_pressures(body: Body) -> Found:
 def _blow_ratio(body: Body) -> Found:
     """Report a tube that is blown into a mould that is too wide for it.
 
-    Its radius grows more than 8-fold, or its pressure falls below 0.8 times its maximum, so that it bulges locally.
+    Its radius grows more than 8-fold, or the estimated pressure of a uniform tube falls below 0.8 times its maximum on
+    the way to the mould, so that it bulges locally.
     """
     for face in body.pressurised_faces:
         if not (face.tools and face.tall and face.axisymmetric):

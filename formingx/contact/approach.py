@@ -195,9 +195,9 @@ class Approach:
     def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """Return True if too many points came into contact in a step.
 
-        The limit is 2 plus twice the larger of `max_closures` and the predicted number of gap closures. In lagged
-        contact the limit concerns the depth: a new point must not be deeper in the tool than twice its tributary
-        length. Contacts without history variables have no limit.
+        The limit is 2 plus twice the larger of `max_closures`, allowed in a step, and the number of predicted gap
+        closures. In lagged contact, whose friction uses the last pressure, depth counts: a new point must not be
+        deeper in the tool than twice its tributary length. Contacts without history variables have no limit.
 
         Args:
             old: locally owned unknowns at the start of the step, shape (n,).

@@ -117,7 +117,9 @@ class Body:
         self.jump(brentq(lambda s: self._load(s, self._after_jump(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
 
     def deform(self, path: Callable, times: Any) -> np.ndarray:
-        """Return the loads at times, shape (n,), while the degree of freedom s is a prescribed function of time.
+        """Return the loads, stress, shape (n,), while the degree of freedom s is a prescribed function of time.
+
+        For a block s is the logarithm of its stretch and the load its stress; see `Body` for walls.
 
         Args:
             path: function of time that returns s and ds/dt.

@@ -201,8 +201,8 @@ class MidSurfaceProbe(Probe):
     def _mean_over_elements(self, values: np.ndarray) -> np.ndarray:
         """Return the mean of a vector over both elements at points where two elements meet; collective.
 
-        values: vectors at the ends of this rank's elements that meet such a point, shape (ends, 2). The result has the
-        shape (n, 2) for all n points of the probe; it is 0 at points where no elements meet.
+        values: one vector for each element end of this rank that lies on such a point, in the order of `_ends`, shape
+        (ends, 2). The result has the shape (n, 2) for the n points of the probe, 0 at points where no elements meet.
         """
         total = np.zeros((len(self.points), self._components))
         np.add.at(total, self._ends[0], values / 2)

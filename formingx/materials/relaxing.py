@@ -291,7 +291,8 @@ class GeneralisedMaxwell(RelaxingMaterial):
 
         Args:
             axes: matplotlib axes; None: a new figure.
-            stretches: stretches above 1, shape (n,); None: from 1 to 6, or to 95 % of the largest stretch.
+            stretches: stretches above 1, shape (n,); None: from 1 to 6, but at most to 95 % of the stretch at which the
+                material locks.
             unit: unit of stress of the constants, for the label.
             mode: "uniaxial", "pure_shear" or "equibiaxial".
             rates: Hencky rates, 1/time; None: decades from 0.1 over the longest relaxation time to 10 over the

@@ -160,7 +160,10 @@ class Sag(Quantity):
             self._earlier = (nodes_at - state_transfer.original_positions(nodes_at))[:, -1] / forms.length
 
     def _largest_sag(self, x: Any) -> tuple[float, int]:
-        """Return the sag over the length scale, and the rank that owns the lowest node; `x`: unknowns. Collective."""
+        """Return the largest sag of a node divided by `forms.length`, and the rank that owns the node; collective.
+
+        x: unknowns. The sag is the fall of a node since the start of the run.
+        """
         sag = -(x.array_r[self._dofs] + self._earlier).min(initial=0.0)
         found = self._problem.comm.allgather(float(sag))
         return max(found), int(np.argmax(found))

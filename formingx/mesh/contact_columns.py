@@ -176,7 +176,9 @@ def is_thick_sheet(mesh: Mesh) -> bool:
 
 
 def _distance(s: np.ndarray, fillet: FilletInSheet) -> np.ndarray:
-    """Return the distance of points of the sheet to the part that may lie on a fillet, shape (n,), length.
+    """Return the distance along the sheet from points to the part that may lie on a fillet, shape (n,), length.
+
+    It is 0 within this part.
 
     s: lengths along the sheet from its start to the points, shape (n,).
     """

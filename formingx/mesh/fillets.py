@@ -148,7 +148,7 @@ def flats_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool) -> FlatsInSh
 
 
 def _touched(tool: Any, face: np.ndarray) -> _Touched:
-    """Return the estimate of the material that touches the points of a tool at rest.
+    """Return an estimate of the material points that will touch the points of a tool, which does not move.
 
     Args:
         tool: a tool of a section.

@@ -77,7 +77,7 @@ class QuantityRun(Run):
         super()._accept(state)
 
     def _next_states(self, old: State) -> list[State]:
-        """Return a list with the next state in time after `old`: a target or limit point in the step, or its end."""
+        """Return a list with one state, the next in time: the first target or limit point in the step, else its end."""
         event = self._next_event(old.time)
         while True:
             left = event - old.time

@@ -111,7 +111,7 @@ class Record:
 
     @property
     def equations(self) -> Equations:
-        """Current problem, through the interface of the solver."""
+        """Problem that the run solves at the moment, as the solver sees it (`Equations`)."""
         return self.curve.problem
 
     @property

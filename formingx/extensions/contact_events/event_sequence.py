@@ -293,8 +293,9 @@ class ContactEventSequence:
     def _store_first(self, arc_lengths: np.ndarray, length: float, segment: PathSegment) -> bool:
         """Append the earliest gap closure of all ranks to `_closures`; return False if none is before `length`.
 
-        arc_lengths: arc lengths of the gap closures of the n points, shape (n,). segment: segment of the predicted path
-        that gives the position of the point. All arc lengths are measured from the accepted state.
+        arc_lengths: arc lengths of the gap closures of the n points, shape (n,). segment: segment of the predicted
+        path, which gives the position of that point at its gap closure. All arc lengths are measured from the accepted
+        state.
         """
         best: tuple[float, int, int, int] = (length, 0, 0, 0)
         if len(arc_lengths):

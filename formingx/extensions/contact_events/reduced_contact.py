@@ -176,7 +176,7 @@ class Points:
         return self.starts[closure.face] + closure.point
 
     def values_at(self, values: np.ndarray) -> np.ndarray:
-        """Return values at the m points of all ranks, shape (m, ...), the same on all ranks.
+        """Return values at the m points of the reduced problem, a selection from all ranks, shape (m, ...).
 
         Args:
             values: values at the n owned points of all faces, shape (n, ...).

@@ -179,7 +179,7 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
 
 
 def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
-    """Return an HTML figure of the walls of a search: of the first and the best run, predicted and wanted.
+    """Return an HTML figure of wall thickness over arc length: of the first and the best run, predicted and wanted.
 
     Args:
         result: the `DesignResult` of the search.

@@ -218,7 +218,7 @@ def _result(material: Any, constants: dict[str, float], parts: dict[str, slice],
 
 
 def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Material, Uncertainty]:
-    """Fit a material to tests without time; return it with the uncertainty of its constants.
+    """Fit a material to elastic tests, which state no times; return it with the uncertainty of its constants.
 
     Args:
         material: class, or material with initial constants.

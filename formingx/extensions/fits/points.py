@@ -12,13 +12,13 @@ from .weights import divisors, in_range, named_weights
 
 
 class Points:
-    """Measured stresses of tests without time, checked, as one vector of m numbers.
+    """Measured stresses of elastic tests, which state no times, checked, as one vector of m numbers.
 
     A biaxial test has two stresses at each of its points, the other tests have one.
 
     Args:
         data: {test: (stretches, nominal stresses)}, shape (n,) each; of "biaxial" two stretches and two stresses.
-        relative: True for misfits over the measured stress, False for misfits in stress.
+        relative: True for misfits divided by the measured stress, False for misfits in stress.
         weights: {test: weight of the squared misfits of its points}; None: weight 1.
         within: lowest and highest stretch of the points that count, or None.
 

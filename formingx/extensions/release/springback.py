@@ -173,7 +173,7 @@ def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, 
         x: unknowns of the part in its tools, locally owned entries.
         cooling_time: duration after the release; 0: none.
         accuracy: relative error of a step in time.
-        trimmed: radius r of the end of the part before the release, length.
+        trimmed: radius r of the end of the part in its tools, at the trim line if it is trimmed, length.
         units: units of the labels.
     """
     stages = [Stage("release"), *([Stage("cool", duration=cooling_time)] if cooling_time else [])]

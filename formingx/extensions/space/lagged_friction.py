@@ -56,8 +56,8 @@ class LaggedFriction(LaggedStick):
 
     * `position`: positions, shape (n, 3), length.
     * `slip`: elastic slips as vectors, shape (n, 3), length.
-    * `distance`: depth in the tool of a point in contact, 0 or more, which is the pressure over the penalty k; signed
-      distance of an open point, below -theta; shape (n,), length.
+    * `distance`: of a point in contact its pressure over the penalty k, 0 or more; of an open point its signed
+      distance, below -theta; shape (n,), length.
     * `closure`: positions that store N_0: their depth in the tool is N_0/k, shape (n, 3), length.
 
     Args:

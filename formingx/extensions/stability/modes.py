@@ -343,10 +343,10 @@ class Modes:
 
 
 def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
-    """Return the fraction at which an eigenvalue is 0, by inverse interpolation, or None if it is out of bounds.
+    """Return the fraction of a step at which an eigenvalue is 0, by inverse interpolation, or None outside bounds.
 
     Args:
-        values: (fraction, eigenvalue) pairs of one mode; at most four with the smallest eigenvalues are used.
+        values: (fraction, eigenvalue) pairs of one mode; those with the smallest magnitudes are used, at most four.
         low: lower bound of the fraction.
         high: upper bound of the fraction.
     """

@@ -48,7 +48,7 @@ class Patches:
         self._operators: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
-        """Fit a cubic in (R, Z) to each of k fields, on the patch around each of the m cells.
+        """Fit a cubic in (R, Z) to each of k fields, on the patch around each of the m fitted cells.
 
         Args:
             values: values of the fields at the q quadrature points of each of the n cells of the mesh, shape (n, q, k).

@@ -173,7 +173,7 @@ def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
 
     Args:
         pictures: the images.
-        seconds: duration, s.
+        seconds: duration of all images together, without the second more, s.
         stream: binary stream of the file.
     """
     from PIL import Image

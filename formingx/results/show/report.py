@@ -380,7 +380,7 @@ def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
 
 
 def _convergence(record: ReportData) -> str:
-    """Return a figure of the relative corrections of Newton's method, one line per state; "" without iterations."""
+    """Return an HTML figure of the relative correction over Newton iterations, a line per state; "" without any."""
     lines = [[row[1] for row in history if row[1] > 0] for history in record.histories]
     return page.logarithmic(lines, "Newton iteration", "correction |\u0394x|/|x|",
                             "Correction of every Newton iteration, one line per state.") if any(lines) else ""
