@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..errors import InputError
+from ..mesh.nodes import matching_rows
 from ..physics.contact_law import ContactHistory
 
 
@@ -39,22 +39,20 @@ class FaceHistory(NamedTuple):
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
 
     @classmethod
-    def loaded(cls, data: dict[str, Any], points: np.ndarray, start: ContactHistory, near: float) -> FaceHistory:
+    def loaded(cls, data: dict[str, Any], points: np.ndarray, start: ContactHistory, tolerance: float) -> FaceHistory:
         """Return the history variables of the locally owned points from the arrays of `saved`.
 
         Args:
             data: the arrays, such as the contents of a checkpoint.
             points: reference positions of the n points, shape (n, components), length.
             start: history variables of these points in the reference configuration, for the shapes of arrays.
-            near: tolerance of reference positions, length.
+            tolerance: largest distance between a point and its stored position, length.
 
         Raises:
             InputError: no saved point has the reference position of one of the points.
         """
-        from scipy.spatial import cKDTree
-        away, rows = cKDTree(np.array(data["points"]).reshape(-1, points.shape[1])).query(points)
-        if np.any(away > near):
-            raise InputError("checkpoint: a contact point of the scene is not in it: it belongs to another mesh")
+        rows = matching_rows(points, data["points"], tolerance,
+                             "checkpoint: a contact point of the scene is not in it: it belongs to another mesh")
         history = ContactHistory(*(np.array(data[name], dtype=float)[rows].reshape(getattr(start, name).shape)
                                    for name in ContactHistory._fields))
         return cls(history, np.array(data["newly_closed"], dtype=bool)[rows], np.array(data["penalty"])[rows])

@@ -6,6 +6,7 @@ import numpy as np
 from mpi4py import MPI
 
 from .. import _compat
+from ..errors import InputError
 
 SAME_PLACE = 1e-5
 """Distance, over the extent of a body, below which two places are one: names of points have six digits."""
@@ -67,6 +68,29 @@ def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndar
     squares = ((places[..., None, :] - points) ** 2).sum(-1)            # faster than the import of SciPy
     numbers = squares.argmin(-1)
     return np.sqrt(np.take_along_axis(squares, numbers[..., None], -1)[..., 0]), numbers
+
+
+def matching_rows(points: np.ndarray, stored: Any, tolerance: float, message: str) -> np.ndarray:
+    """Return the row of stored positions that coincides with each point, shape (n,).
+
+    Args:
+        points: reference positions of n points, shape (n, d), length.
+        stored: m stored positions, array or nested list with m * d numbers, length.
+        tolerance: largest distance between a point and its stored position, length.
+        message: text of the error.
+
+    Raises:
+        InputError: a point is farther than `tolerance` from all stored positions.
+    """
+    stored = np.reshape(stored, (-1, points.shape[-1]))
+    if not len(points):                                      # a rank without such points
+        return np.zeros(0, dtype=int)
+    if not len(stored):
+        raise InputError(message)
+    away, rows = nearest(stored, points)
+    if np.any(away > tolerance):
+        raise InputError(message)
+    return rows
 
 
 def cell_node_positions(domain: Any, cells: Any) -> np.ndarray:

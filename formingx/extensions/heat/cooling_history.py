@@ -12,6 +12,7 @@ from ...errors import ConvergenceError, InputError
 from ...findings import Finding
 from ...forms.history import Start
 from ...forms.transfer import MovingLeastSquares
+from ...mesh.nodes import matching_rows
 from ...ranks import combined, gathered, listed
 from ...values.temperature import ABSOLUTE_ZERO
 from ...values.tolerances import EXAMINED_STATES, WARNED_ERROR
@@ -259,11 +260,13 @@ class CoolingHistory:
         Raises:
             InputError: the data belong to another mesh, or only one of both runs has `work_to_heat`.
         """
-        rows = _matching_rows(self._body.points, data["points"])
+        matching = partial(matching_rows, tolerance=1e-9 * np.abs(data["points"]).max(),
+                           message="the temperature history belongs to another mesh")
+        rows = matching(self._body.points, data["points"])
         if ("power" in data) != (self._dissipated is not None):
             raise InputError("the temperature history belongs to a scene with another work_to_heat")
         power = np.array(data["power"])[rows] if "power" in data else None
-        tool_excess = [np.array(d["excess"])[_matching_rows(touch.points, d["points"])].reshape(len(touch.points), -1)
+        tool_excess = [np.array(d["excess"])[matching(touch.points, d["points"])].reshape(len(touch.points), -1)
                        for touch, d in zip(self._body.tool_contacts, data["tools"], strict=True)]
         before = (float(data["before"][0]), np.array(data["before"][1])[rows]) if "before" in data else None
         return HeatState(float(data["time"]), np.array(data["temperature"])[rows], tool_excess, data["step"], power,
@@ -353,23 +356,3 @@ def _equal(a: Any, b: Any) -> bool:
     """
     same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
     return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))
-
-
-def _matching_rows(points: np.ndarray, others: Any) -> np.ndarray:
-    """Return for each point the number of the row of `others` that coincides with it, shape (n,).
-
-    Args:
-        points: positions of n points, shape (n, coordinates), length.
-        others: stored positions, among which the points are searched, shape (m, coordinates), length.
-
-    Raises:
-        InputError: a point is not among the stored positions.
-    """
-    from scipy.spatial import cKDTree
-    others = np.reshape(others, (-1, points.shape[-1]))
-    if not len(points):
-        return np.zeros(0, dtype=int)
-    away, rows = cKDTree(others).query(points)
-    if np.any(away > 1e-9 * np.abs(others).max()):
-        raise InputError("the temperature history belongs to another mesh")
-    return rows
