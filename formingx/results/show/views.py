@@ -32,9 +32,13 @@ def revolved(profile: Any, file: Any, comm: Any) -> None:
     """
     low, high = _bounds(profile)
     tall = high[1] - low[1] > 4 * high[0]
-    turn = (0.0, np.pi) if tall else (0.0, 1.5 * np.pi)
-    _view(profile, np.linspace(*turn, 181), lambda p, a: (p[:, 0] * np.cos(a), p[:, 0] * np.sin(a), p[:, 1]),
-          (1.2, -3.4, 1.2) if tall else (2.0, -3.4, 1.9), file, comm)
+    turn, camera = (np.pi, (1.2, -3.4, 1.2)) if tall else (1.5 * np.pi, (2.0, -3.4, 1.9))
+
+    def turned(points, angle):
+        return points[:, 0] * np.cos(angle), points[:, 0] * np.sin(angle), points[:, 1]
+
+    file = files.named("view3d", file, ".png")
+    files.on_root(comm, lambda: _draw(profile, np.linspace(0.0, turn, 181), turned, camera, file))
 
 
 def extruded(profile: Any, file: Any, comm: Any) -> None:
@@ -56,8 +60,12 @@ def extruded(profile: Any, file: Any, comm: Any) -> None:
         profile, width = _mirrored(profile), 2 * high[0]
     else:
         width = high[0] - low[0]
-    _view(profile, np.linspace(-0.75 * width, 0.75 * width, 2), lambda p, y: (p[:, 0], np.full(len(p), y), p[:, 1]),
-          (1.9, -3.4, 1.7), file, comm)
+
+    def shifted(points, y):
+        return points[:, 0], np.full(len(points), y), points[:, 1]
+
+    file = files.named("view3d", file, ".png")
+    files.on_root(comm, lambda: _draw(profile, 0.75 * width * np.array([-1, 1]), shifted, (1.9, -3.4, 1.7), file))
 
 
 def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -72,25 +80,6 @@ def _mirrored(profile: Any) -> Any:
         return np.vstack([points[:0:-1] * (-1, 1), points])
     faces = profile.reference_bottom, profile.reference_top, profile.bottom, profile.top
     return type(profile)(*(whole(points) for points in faces))
-
-
-def _view(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any, comm: Any) -> None:
-    """Draw the surface that a section sweeps out as a PNG (rank 0 draws).
-
-    Args:
-        profile: the `Profile` of the section.
-        stations: parameters of the m successive positions of the section, such as angles, shape (m,).
-        place: function of (points (r, z) of the section, shape (n, 2); parameter) that returns their coordinates x, y
-            and z, shape (n,) each.
-        camera: direction from the sheet to the camera, (x, y, z).
-        file: name of the picture, which ends in .png.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: the name has another ending, or there is neither a screen nor Xvfb.
-    """
-    file = files.named("view3d", file, ".png")
-    files.on_root(comm, lambda: _draw(profile, stations, place, camera, file))
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
