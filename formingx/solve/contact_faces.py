@@ -7,6 +7,8 @@ from typing import Any, Protocol, TypeAlias
 
 import numpy.typing as npt
 
+from ..contact.rule import Rule
+
 Array: TypeAlias = npt.NDArray[Any]
 
 
@@ -90,12 +92,12 @@ class ContactFace(Protocol):
 
     Attributes:
         points: reference positions of the contact points, shape (n, c), length.
-        rule: quadrature rule of the face (`formingx.contact.rule.Rule`). It interpolates displacements at the contact
-            points, and adds their forces to the residual.
+        rule: quadrature rule of the face. It interpolates displacements at the contact points, and adds their forces to
+            the residual.
     """
 
     points: Array
-    rule: Any
+    rule: Rule
 
     @property
     def increment(self) -> Increment:
@@ -106,7 +108,10 @@ class ContactFace(Protocol):
         """Factor from the traction of each point to its force in the dimensionless residual F, shape (n,), 1/stress."""
 
     def apply(self, forces: Array | None) -> None:
-        """Set contact forces that act in F in place of the contact law, shape (n, c); None: the law acts."""
+        """Set contact forces that act in F in place of the contact law, shape (n, c), dimensionless.
+
+        The law acts at points with NaN, and at all points after None.
+        """
 
     def relative_motion(self, dx: Array, step: Array | float) -> Array:
         """Return the motion of the n points relative to their tool due to an update, shape (n, c), length.
