@@ -10,6 +10,7 @@ from test_derivatives import difference, random_state, residual
 import formingx as fx
 from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
+from formingx.solve.local_contact import unit_forces
 
 
 @pytest.mark.quick
@@ -34,6 +35,25 @@ def test_tangent_is_derivative_of_residual(friction):
     free = np.setdiff1d(np.arange(len(out.array_r)), problem.constrained)
     found = difference(residual(problem, 0.1), x, d, 1e-6)
     np.testing.assert_allclose(out.array_r[free], found[free], atol=2e-6 * np.abs(found).max())
+
+
+@pytest.mark.parametrize("points", ["nodes", pytest.param(3, id="3 Gauss points")])
+def test_unit_forces_are_added_forces(points):
+    """A column for each component of each point: what such a force in place of the law's adds to the residual."""
+    problem = Problem(cup("none", elements=(4, 1), points=points))
+    face, x = problem.contacts[0], random_state(problem)[0]
+    chosen = np.arange(len(face.points))[1:-1:2]
+    found, before = unit_forces(problem, [face], [chosen]), residual(problem, 0.1)(x)
+    columns = []
+    for point in chosen:
+        for way in range(2):
+            forces = np.full(face.points.shape, np.nan)             # NaN: the law acts; away from the tool, with 0
+            forces[point] = np.eye(2)[way]
+            face.apply(forces)
+            columns.append(residual(problem, 0.1)(x) - before)
+            face.apply(None)
+    assert found.shape == (len(before), 2 * len(chosen)) and np.sum(np.abs(found).max(0) > 0.1) >= len(chosen)
+    np.testing.assert_allclose(found, np.transpose(columns), atol=1e-12 * max(1.0, np.abs(before).max()))
 
 
 def test_forces_are_those_of_contact_at_nodes():
