@@ -155,6 +155,15 @@ def test_large_wall_changes_in_a_frictional_snap_through_are_reported(rough):
     assert finding.severity == "warning" and f"state {k}" in finding.text and "StepControl" in finding.text
 
 
+def test_the_next_snap_through_changes_the_control_ten_times_as_much(rough):
+    """Until a step succeeds."""
+    first = SnapThrough().control_change
+    for k, state in enumerate(rough.states):
+        if state.kind == "jump":
+            before, during, after = (rough.states[n].stepping["jumps"][0] for n in (k - 1, k, k + 1))
+            assert during == pytest.approx(10 * first, rel=1e-12) and before == after == first
+
+
 def share_of_friction(path):
     """Largest traction by the elastic slip that is remembered, over mu N, of all points that touch and states."""
     contact, n, most = path.problem.contacts[0], path.problem.forms.space.dofmap.index_map.size_local, 0.0
