@@ -206,6 +206,18 @@ def test_rows_of_elements_under_a_sharp_edge():
     assert fx.check(sharp(80, 1)).healthy and fx.check(sharp(80, 4, "stick")).healthy
 
 
+@pytest.mark.parametrize("turn, found", [(10.1, True), (9.9, False), (-20.0, False)])
+def test_a_convex_edge_of_ten_degrees_is_sharp(turn, found):
+    """A plug with a cone around its flat end. A concave edge, `turn` < 0, is not sharp."""
+    away = np.array([np.cos(np.radians(turn)), np.sin(np.radians(turn))])
+    plug = fx.tools.Tool([(0.0, 2.0), (1.9, 2.0), np.array([1.9, 2.0]) + away, (1.9 + away[0], 6.0)], [0, 0, 0.4, 0])
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=8.89, thickness=0.6985, elements=(80, 4)),
+                     materials=fx.NeoHookean(c10=0.448), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", plug, "none", direction=(0, -1))])
+    assert [(f.severity, "(R, Z) = (1.9, 2) is sharp" in f.text) for f in fx.check(scene).findings] == (
+        [("warning", True)] if found else [])
+
+
 @pytest.mark.parametrize("make, targets, severity, words", [
     (lambda: formed((20, 1), fx.tools.cup(fillet=0.02, **CUP)), [], "warning",
      "fillet of radius 0.02 .* is 0.0314 long, 0.5 elements .* use 80 or more"),
