@@ -172,6 +172,14 @@ def pushed_from(z):
                     contacts=[fx.Contact("top", fx.tools.sphere(radius=0.5, z=z), "none", direction=(0, -1))])
 
 
+def test_a_small_tool_is_not_taken_to_pass_a_film_unseen():
+    """A ball 2 across, 6 above a film of thickness 0.01, may travel 72 by default: it touches the film on its way."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=20.0, thickness=0.01, elements=(40, 1)), materials=fx.NeoHookean(c10=2.0),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     contacts=[fx.Contact("top", fx.tools.sphere(radius=1.0, z=6.01), "none", direction=(0, -1))])
+    assert fx.check(scene).healthy
+
+
 def test_a_parison_in_mm_in_a_mould_in_cm():
     with pytest.raises(fx.InputError, match=r"the tool is 16.* large, the body 119: are the units of length the same"):
         bottle(fx.Gent(mu=0.8, Jm=30.0), 3.0, length=10.0)
