@@ -64,6 +64,15 @@ def test_dissipation_of_elastic_materials_is_refused():
         fx.Cooling(POLYMER, unit="C", tools=np.zeros(3))
 
 
+def test_the_name_of_a_cooling_has_all_its_arguments():
+    air, given = fx.Convection("top", h=2e-5, air=20.0), {"plug": (0.3, 30.0)}
+    for work in (None, 0.5):
+        cooling = fx.Cooling(POLYMER, [air], unit="K", tools=given, tolerance=0.02, work_to_heat=work)
+        same = eval(repr(cooling), vars(fx))
+        assert repr(same) == repr(cooling)
+        assert (same.unit, same.tools, same.tolerance, same.work_to_heat) == ("K", cooling.tools, 0.02, work)
+
+
 def pressed():
     """A hot relaxing sheet under a cold conducting plug, with friction by temperature and work as heat."""
     tool = fx.tools.male(radius=0.4, height=1.0, base=-1.0, fillet=0.2).mirrored().moved(z=0.05)

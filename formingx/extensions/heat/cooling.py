@@ -97,7 +97,8 @@ class Cooling:
     def __repr__(self) -> str:
         tools = {name: (tool.conductance, tool.tool) for name, tool in self.tools.items()}
         work = f", work_to_heat={self.work_to_heat!r}" * (self.work_to_heat is not None)
-        return f"Cooling({self.materials!r}, {self.boundaries!r}, unit={self.unit!r}, tools={tools!r}{work})"
+        return (f"Cooling({self.materials!r}, {self.boundaries!r}, unit={self.unit!r}, tools={tools!r},"
+                f" tolerance={self.tolerance!r}{work})")
 
     def check(self, scene: Any) -> None:
         """Raise an InputError unless this heat conduction fits a scene.
