@@ -91,3 +91,12 @@ def test_shear_at_a_constant_rate(damping):
     assert found == pytest.approx(quad(slope, 0, t, limit=200)[0], rel=1e-6)
     lodge = sum(G * tau * rate * -np.expm1(-t / tau) for G, tau in SPECTRUM)
     assert found == pytest.approx(lodge, rel=1e-9) if damping is None else found < 0.9 * lodge
+
+
+def test_shear_starts_without_stress():
+    """Without damping the stress is a sum of G tau rate (1 - exp(-t/tau)); negative times are refused."""
+    melt, rate, t = fx.KBKZ(SPECTRUM), 3.0, np.array([0.0, 1e-9, 1e-4])
+    expected = [sum(G * tau * rate * -np.expm1(-time / tau) for G, tau in SPECTRUM) for time in t]
+    assert melt.shear(rate, t) == pytest.approx(expected, rel=1e-12, abs=0)
+    with pytest.raises(fx.InputError, match=r"shear: times = \[0.0, -1.0\]: must not be negative"):
+        melt.shear(rate, [0.0, -1.0])

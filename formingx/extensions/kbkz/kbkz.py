@@ -199,27 +199,30 @@ class KBKZ(RelaxingMaterial):
 
         Args:
             rate: shear rate, 1/time, positive.
-            times: times t since the start of the shear, shape (n,), positive.
+            times: times t since the start of the shear, shape (n,), not negative.
 
         Returns:
             Shear stress, shape (n,), stress.
 
         Raises:
-            InputError: a rate that is not above 0, or times that are not finite.
+            InputError: a rate that is not above 0, or times that are negative or not finite.
 
         >>> melt = fx.KBKZ([(1000.0, 1.0)])                                    # viscosity 1000 Pa s
         >>> round(float(melt.shear(0.1, [50.0])[0]), 6)
         100.0
         """
         rate, t = positive(f"{self}: shear: rate", rate), finite_array(f"{self}: shear: times", times)
+        if np.any(t < 0):
+            raise InputError(f"{self}: shear: times = {times!r}: must not be negative")
         modulus, tau = np.array(self.spectrum).T
+        first = 1e-3 * tau.min()                             # largest age in the first interval of the integral
 
         def damped_strain(strain: np.ndarray) -> np.ndarray:
             """Return the damping h times a shear strain, any shape."""
             return strain * (1.0 if self.damping is None else self.damping(3 + strain**2, 3 + strain**2))
         found = []
         for now in np.atleast_1d(t):
-            ends = np.append(0.0, np.geomspace(min(1e-3 * tau.min(), 0.5 * now), now, 60))
+            ends = now * np.append(0.0, np.geomspace(first / max(now, 2 * first), 1.0, 60))
             half = np.diff(ends)[:, None] / 2
             age = ends[:-1, None] + half * (1 + _NODES)
             memory = np.exp(-age[..., None] / tau) @ (modulus / tau)
