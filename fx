@@ -21,7 +21,9 @@ export PETSC_OPTIONS="-no_signal_handler${PETSC_OPTIONS:+ $PETSC_OPTIONS}"   # s
 export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export OMPI_MCA_btl="${OMPI_MCA_btl:-self,sm}"
 export OMPI_MCA_topo="${OMPI_MCA_topo:-basic}"       # open-mpi/ompi#13918: the other one hangs now and then
-export OMPI_MCA_mpi_yield_when_idle="${OMPI_MCA_mpi_yield_when_idle:-1}"     # ranks that wait leave the core to others
+case ${1##*/} in mpirun|mpiexec|prterun)             # ranks that wait leave the core to others; one rank waits for none
+    export OMPI_MCA_mpi_yield_when_idle="${OMPI_MCA_mpi_yield_when_idle:-1}" ;;
+esac
 export PRTE_MCA_rmaps_default_mapping_policy="${PRTE_MCA_rmaps_default_mapping_policy:-:oversubscribe}"
 
 way=${FX:-}

@@ -371,7 +371,7 @@ def ranks(counts: tuple[int, ...] = (1, 2, 3, 4)) -> dict[str, float]:
     results = []
     for n in counts:
         done = subprocess.run(["mpirun", "-n", str(n), sys.executable, "-c", _RANKS], cwd=root, capture_output=True,
-                              text=True, check=True)
+                              text=True, check=True, env=os.environ | {"OMPI_MCA_mpi_yield_when_idle": "1"})
         results.append(json.loads(done.stdout.strip().splitlines()[-1]))
     worst = {}
     for k, name in enumerate(("free", "formed")):

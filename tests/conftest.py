@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 from mpi4py import MPI
-from on_ranks import Ranks, execute
+from on_ranks import ENVIRONMENT, Ranks, execute
 
 import formingx as fx
 
@@ -63,7 +63,7 @@ def run(*command, ranks=None, timeout=600):
     """Run a Python command of the checkout as a user does; returns what it printed."""
     launcher = ["mpirun", "-n", str(ranks)] if ranks else []
     done = subprocess.run([*launcher, sys.executable, *map(str, command)], cwd=ROOT, capture_output=True, text=True,
-                          timeout=timeout)
+                          timeout=timeout, env=ENVIRONMENT if ranks else None)
     assert done.returncode == 0, done.stdout + done.stderr
     return done.stdout
 

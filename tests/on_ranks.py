@@ -6,12 +6,16 @@ Ranks that wait for a script wait for a message of the tests, not in MPI, where 
 import contextlib
 import gc
 import io
+import os
 import subprocess
 import sys
 import tempfile
 import traceback
 from multiprocessing.connection import Client, Connection, Listener, wait
 from pathlib import Path
+
+ENVIRONMENT = os.environ | {"OMPI_MCA_mpi_yield_when_idle": "1"}
+"""Environment of `mpirun`, as `./fx mpirun` sets it: ranks that wait leave the core to others."""
 
 
 class Ranks:
@@ -25,7 +29,7 @@ class Ranks:
             listener._listener._socket.settimeout(300)
             self._process = subprocess.Popen(
                 ["mpirun", "-n", str(size), sys.executable, __file__, address], cwd=Path(__file__).parents[1],
-                stdin=subprocess.DEVNULL, stdout=said, stderr=said)
+                env=ENVIRONMENT, stdin=subprocess.DEVNULL, stdout=said, stderr=said)
             try:
                 self._lines = [listener.accept() for _ in range(size)]
                 self._lines.sort(key=lambda line: line.recv())

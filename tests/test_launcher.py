@@ -63,3 +63,13 @@ def test_container_mounts_the_writable_folders_alone(tmp_path):
     mounted = {line.split(":")[0] for before, line in zip(lines, lines[1:]) if before == "-v"}
     assert {f"/{path.split('/')[1]}" for path in (str(ROOT), str(tmp_path), "/home/some body", "/tmp")} <= mounted
     assert "HOME=/home/some body" in lines and lines[lines.index("-w") + 1] == str(tmp_path)
+
+
+def test_only_ranks_of_mpirun_yield_the_core(tmp_path):
+    """A run on one rank would otherwise lose the core to other processes in each of thousands of calls of MPI."""
+    mpirun = tmp_path / "mpirun"
+    mpirun.write_text("#!/bin/sh\necho [$OMPI_MCA_mpi_yield_when_idle]\n")
+    mpirun.chmod(0o755)
+    for command, shown in ((mpirun,), "[1]\n"), (("sh", mpirun), "[]\n"):
+        done = fx(*command, FX_INSIDE="1", OMPI_MCA_mpi_yield_when_idle="")
+        assert done.returncode == 0 and done.stdout == shown
