@@ -29,10 +29,10 @@ PICTURE = re.compile(r"\]\(pictures/(\w+\.png)\)")
 
 
 def store(picture: Path, file: Path) -> None:
-    """Store a picture with at most 560 pixels a side and 64 colours."""
+    """Store a picture with at most 560 pixels a side and 256 colours."""
     with Image.open(picture) as image:
         image.thumbnail((560, 560))
-        image.convert("RGB").quantize(64).save(file, optimize=True)
+        image.convert("RGB").quantize(256, kmeans=2).save(file, optimize=True)
 
 
 def rewrite(page: Path) -> None:
