@@ -45,6 +45,7 @@ const maps = run => run.images.flatMap(([sr, sz, dr, dz]) => (run.axisymmetric ?
   .map(side => [v => v.map(r => side * (sr * r + dr)), v => v.map(z => sz * z + dz)]));
 
 const format = x => x === null || x === undefined ? "" : Number(x.toPrecision(4)).toString();
+const stated = (label, x) => { const [name, unit] = label.split(", "); return `${name} ${format(x)} ${unit || ""}`.trim(); };
 
 function sectionTraces(run, at, field, range) {
   const sides = maps(run), traces = [];
@@ -64,7 +65,7 @@ function sectionTraces(run, at, field, range) {
   sides.forEach(([across, up], n) => traces.push({type: "scatter", mode: "markers", showlegend: false, hovertemplate: "%{text}<extra></extra>",
     x: across(r), y: up(z),
     text: r.map((_, k) => Math.round(k / parts)).map(i => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
-      Object.entries(at.all).map(([name, v]) => `${name}: ${format(v[i])}`).join("<br>")),
+      Object.entries(at.all).map(([label, v]) => stated(label, v[i])).join("<br>")),
     marker: {size: 6, color: dense(at.values), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
       cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0,
       title: {text: narrow() ? "" : field, side: "right"}, ...(narrow() ? {orientation: "h", yref: "container", y: 0, yanchor: "bottom", len: 1} : {})}}}));
@@ -80,7 +81,7 @@ function mesh(run, at, field, range) {
     z: points[2].map(z => sz * z + dz)}), [i, j, k] = run.mesh.triangles;
   const sheets = run.images.map((map, n) => ({type: "mesh3d", ...image(at.points, map), i, j, k, intensity: at.values,
     ...paint(field, range), showscale: n === 0, colorbar: {thickness: 12, len: 0.85, title: {text: field, side: "right"}},
-    text: at.values.map(v => `${field}: ${format(v)}`), hovertemplate: "%{text}<extra></extra>"}));
+    text: at.values.map(v => stated(field, v)), hovertemplate: "%{text}<extra></extra>"}));
   const tools = run.mesh.tools.flatMap((tool, n) => tool.images.map(map => {
     const points = tool.points.map((v, axis) => v.map(x => x + (at.moved[n] ?? 0) * tool.moves[axis]));
     return {type: "mesh3d", ...image(points, map), i: tool.triangles[0], j: tool.triangles[1], k: tool.triangles[2], color: GREY,
@@ -137,7 +138,7 @@ function process(data) {
     const s = slider.value / 1000, field = colour.value, range = limits(run, field), at = frame(run, s, field);
     if (run.mesh) { Plotly.react("solid", mesh(run, at, field, range), scene(), config); }
     else Plotly.react("section", sectionTraces(run, at, field, range), layout(), config);
-    element("now").textContent = [at.stage.replaceAll("_", " "), ...Object.entries(at.numbers).map(([n, v]) => `${n}: ${format(v)}`)]
+    element("now").textContent = [at.stage.replaceAll("_", " "), ...Object.entries(at.numbers).map(([label, v]) => stated(label, v))]
       .filter(Boolean).join(" · ");
     if (solid && !run.mesh) Plotly.react("solid", surface(run, at, field, range), scene(), config);
   }
