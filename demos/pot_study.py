@@ -72,7 +72,9 @@ def main():
     for axes, label in zip(effects.axes, ("travel of the plug, mm", "radius of the plug, mm", "friction of the plug")):
         axes.set_xlabel(label)
     save(effects, args.out / "effects.png")
-    save(found.plot_pareto("evenness", "plug_force"), args.out / "pareto.png")
+    front = found.plot_pareto("evenness", "plug_force")
+    front.axes[0].set(xlabel="evenness (minimum over mean wall)", ylabel="largest force on the plug, N")
+    save(front, args.out / "pareto.png")
     if not args.quick:
         found.refine(evaluations=args.search)
         say(f"after a search: evenness {found.best.measures['evenness']:.4f} at {found.best.values}")
@@ -80,7 +82,7 @@ def main():
     found.report(args.out / "study.html", "Yoghurt pot: what makes it even")
     path = pot(**found.best.values)
     path.report(args.out / "best.html", "The most even pot", units=UNITS, density=1.05, trim=TRIM)
-    path.animate(args.out / "best.gif", frames=12 if args.quick else 60)
+    path.animate(args.out / "best.gif", frames=12 if args.quick else 60, units=UNITS)
     summarise(args.out, {"runs": len(found.runs), "failed": len(found.runs) - len(found.successful), "seconds": seconds,
                          "processor_seconds": spent, "workers": workers,
                          "best_of_the_design": {**design.values, **design.measures},

@@ -24,6 +24,7 @@ def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measur
         ax.plot([run.values[variable] for run in runs], [run.measures[measure] for run in runs], ".", color="0.75")
         ax.plot(list(levels), list(levels.values()), "o-", color="C0")
         ax.set(xlabel=variable.replace("_", " "), ylabel=measure.replace("_", " "))
+        ax.locator_params("x", nbins=6)                     # or the numbers of a single level run into each other
     return drawing
 
 
