@@ -110,6 +110,12 @@ def name_of(plug):
     return f"{plug[0]:g}_C_{plug[1]:g}_W_per_m2K"
 
 
+def label_of(name):
+    """Return the label of a run in figures."""
+    return name.replace("_C_", " °C, ").replace("_W_per_m2K", " W/m²K").replace(f"{HOT:g} °C, 0 W/m²K",
+                                                                               "no heat to the plug")
+
+
 def combination(relaxes, chills, rubs):
     """Return the names of the factors that are present."""
     return " + ".join(f for f, there in zip(FACTORS, (relaxes, chills, rubs)) if there) or "none of the three"
@@ -154,17 +160,16 @@ def draw(found, shapes, factorial):
     sections.legend(frameon=False, fontsize="small", loc="lower left")
     for name, of in shapes.items():
         if "vacuum" in of and ("_C_" in name or name == "straight vacuum") and name != name_of(PLUGS[-1]):
-            label = name.replace("_C_", " °C, ").replace("_W_per_m2K", " W/m²K").replace(
-                f"{HOT:g} °C, 0 W/m²K", "no heat to the plug")
             walls.plot(of["vacuum"].reference_radius, of["vacuum"].wall_ratio, "k--" if name.startswith("s") else "-",
-                       label=label)
+                       label=label_of(name))
     walls.set(xlabel="reference radius R, mm", ylabel="wall / original", ylim=(0, None), title="plugs")
     walls.legend(frameon=False, fontsize="small")
     rows = {combination(*which): n for which, n in factorial.items()} or found
     place = np.arange(len(rows))
     for k, (key, word) in enumerate(KEYS.items()):
         bars.barh(place + 0.27 * (1 - k), [n.get(key, np.nan) for n in rows.values()], 0.25, label=word)
-    bars.set_yticks(place, [name.replace(" + ", "\n+ ") for name in rows], fontsize="x-small")
+    bars.set_yticks(place, [label_of(name).replace(" + ", "\n+ ").replace(", ", ",\n") for name in rows],
+                    fontsize="x-small")
     bars.set(xlabel="wall / original", title="what makes the base")
     bars.legend(frameon=False, fontsize="small", loc="lower right")
     return figure

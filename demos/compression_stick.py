@@ -90,7 +90,9 @@ def numbers_at_largest_deflection(n, out) -> dict:
                            "over_lindley": force(state) / float(lindley(at)), "ended": end}
             say(f"{name}: {force(state):.1f} N at {at:.3f} cm, {found[name]['over_lindley']:.3f} of Lindley"
                 + ("" if end == "done" else f", the furthest that it was pressed; ended: {end[:160]}"))
-            draw_grids(path, [state], [f"{name}, {at:.2f} cm"], elements, out / f"grid_{name}.png")
+            side = "side rolls onto the plates" if roll_over else "side without contact"
+            draw_grids(path, [state], [f"{elements[0]} x {elements[1]} elements, {side}, {at:.2f} cm"], elements,
+                       out / f"grid_{name}.png")
     return found
 
 

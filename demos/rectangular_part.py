@@ -46,7 +46,7 @@ def main():
         name = name_of(friction)
         path, mould = cup.form(friction, elements, kinematics=fx.PlaneStrain())
         summary[name] = cup.key_numbers(path, mould)
-        report(path, mould, summary[name], cup.PRESSURES, args.out, name,
+        report(path, mould, summary[name], cup.PRESSURES, args.out, name, along="reference position R",
                curve=(R, ratio, "membrane") if friction == "stick" else None)
         if friction == "stick":
             profile = path.profile()
