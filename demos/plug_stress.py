@@ -144,7 +144,7 @@ def draw(found, tool, travel, law):
     axes[3].set(ylabel="z, cm")
     for ax in axes[3:]:
         ax.set(xlabel="r, cm")
-    figure.suptitle(f"{law}, {travel:g} cm")
+    figure.suptitle(f"{law}, travel {travel:g} cm (ring: largest value; left scales: 0 to 1, as in the thesis)")
     return figure
 
 
