@@ -325,6 +325,13 @@ def test_report_shows_standard_deviations(tmp_path):
     assert "How sure" not in run.report(tmp_path / "run.html").read_text()
 
 
+def test_report_of_a_parameter_without_bounds(tmp_path):
+    run = fx.Design(disc, {"c": (0.0, -1, 1), "h": 0.05}).run()
+    text = run.report(tmp_path / "run.html").read_text()
+    assert "inf</td>" not in text and text.count("<td class=number></td>") == 2
+    assert "of its start value if a bound is missing" in text
+
+
 def test_minimum_weight():
     """The smallest wall equals the required minimum, no wall is much larger, and the volume decreases."""
     design = fx.Design(programmed, {"h": fx.spline(4, start=0.0, low=-1, high=1)})

@@ -16,6 +16,8 @@ from ...units import Units
 from .scatter import covariance_of
 from .scatter import deviations as deviations_of
 
+_RANGE = "its range, or of its start value if a bound is missing"
+
 
 def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
     """Write the report of a search for design parameters as an HTML page (rank 0 writes).
@@ -233,7 +235,7 @@ def _heat_map(effects: Any, units: Units) -> str:
     effects.plot(axes)
     return "<h2>What changes the wall, and where</h2>" + page.figure(
         drawing, f"Change of the wall{f' in {units.length}' if units.length else ''} that the derivatives predict where"
-                 f" a parameter changes by a tenth of its range.")
+                 f" a parameter changes by a tenth of {_RANGE}.")
 
 
 def _uncertainties(run: Any, deviations: Any, units: Units) -> list[str]:
@@ -280,9 +282,9 @@ def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
             units.label("wall", "largest change"), units.label("volume")]
     most = tenth[abs(tenth).argmax(0), np.arange(len(p))]
     rows = [[name, *([page.number(before.vector[k])] if before else []),
-             *(page.number(v) for v in (run.vector[k], p.low[k], p.high[k])),
+             page.number(run.vector[k]), *(page.number(v) if np.isfinite(v) else "" for v in (p.low[k], p.high[k])),
              *(f"{v:.3g}" for v in (tenth[:, k].mean(), tenth[thin, k], most[k], volume_change[k]))]
             for k, name in enumerate(p.names)]
-    return page.table(head, rows) + ("<p class=lead>Changes that a tenth of the range of a parameter makes, to first"
-                                     " order: of the mean and of the minimum wall, the largest anywhere, of the volume."
-                                     "</p>")
+    return page.table(head, rows) + (f"<p class=lead>Changes when a parameter changes by a tenth of {_RANGE}, to first"
+                                     f" order: of the mean and of the minimum wall, the largest anywhere, of the"
+                                     f" volume.</p>")

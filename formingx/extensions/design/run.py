@@ -67,7 +67,7 @@ class Effects:
         """Draw a heat map of the derivatives, with a row for each parameter, over `coordinates`.
 
         The colour is the change of the output quantity, to first order, if the parameter changes by a tenth of its
-        range.
+        range, or of its start value if a bound is missing.
 
         Args:
             axes: matplotlib axes; default a new figure.
