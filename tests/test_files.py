@@ -175,6 +175,15 @@ def test_animation(formed, tmp_path):
         formed.animate(tmp_path / "run.avi")
 
 
+def test_an_animation_of_a_tall_part_is_narrow(tmp_path):
+    mesh = fx.mesh.parison(inner_radius=10.0, thickness=2.0, length=130.0, elements=(20, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("axis"), fx.Clamped("neck")])
+    fx.trace(scene, until=fx.pressure(0.01), progress=False).animate(tmp_path / "run.gif", frames=2)
+    with Image.open(tmp_path / "run.gif") as film:
+        assert film.size == (680, 420)                     # 2.8 and 4 inches, not 6 and 4
+
+
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
 def test_an_animation_is_mp4(formed, tmp_path):
     """Seven moving frames in two seconds, and the last one for a second more, as ffmpeg's own programs read them."""

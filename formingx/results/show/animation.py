@@ -123,7 +123,8 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     low, high = plots.span(shapes, mirrored=len(sides) == 2)
     ratios = [s.wall_ratio for s in shapes]
     colours = Normalize(min(r.min() for r in ratios), max(r.max() for r in ratios))
-    figure, (sheet, loading) = plots.figure(2, width=5.0, height=4.2, ratios=(1.5, 1))
+    wide = float(np.clip(3.5 * (high - low)[0] / (high - low)[1] + 1.4, 2.8, 6.0))    # a bottle fills its panel, too
+    figure, (sheet, loading) = plots.figure(2, width=wide / 2 + 2, height=4.2, ratios=(wide, 4))
     bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=sheet, shrink=0.8, label="thickness / original")
     bar.outline.set_visible(False)
 
