@@ -597,7 +597,7 @@ def test_report_of_a_warm_process(tmp_path, capsys):
     assert "must be LENGTH,STRESS" in capsys.readouterr().err
     for name in ("one", "two"):
         text, data = page(tmp_path / f"{name}.html"), drawn(tmp_path / f"{name}.html")
-        for said in ("0.25 at 40, 0.1 at 100", "temperature, C", "0.025", "heat_capacity=", "gap closure (",
+        for said in ("0.25 at 40, 0.1 at 100", "temperature, °C", "0.025", "heat_capacity=", "gap closure (",
                      "go down"):
             assert said in text
         assert "lambda" not in text and ("volume of the part" in text) == (name == "one")
@@ -607,7 +607,7 @@ def test_report_of_a_warm_process(tmp_path, capsys):
         faces = np.vstack([profile.reference_bottom, profile.reference_top])
         T = path.temperature(faces).reshape(2, -1).mean(0)
         assert last == pytest.approx([T.max(), T.mean(), T.min()], rel=1e-3) and T.min() < 95
-        assert "temperature, C" in data["runs"][0]["sheet"]["fields"]
+        assert "temperature, °C" in data["runs"][0]["sheet"]["fields"]
         assert next(chart for chart in data["charts"] if chart["title"] == "Force over time")["y"] == "force, N"
     limits = path.counts.limits
     for command in (["status"], ["watch", "--patience", "0"]):

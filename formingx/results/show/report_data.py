@@ -58,7 +58,7 @@ class ReportData:
         failure: error message that ended the run, or "".
         inadmissible_reasons: reason why each state is inadmissible, or "" (`State.inadmissible_reason`).
         heat: {tool: (conductance of the contact, temperature of the tool as text)} for tools that conduct heat.
-        unit: unit of temperatures, "C" or "K"; "" without heat transfer.
+        unit: unit of temperatures, "°C" or "K"; "" without heat transfer.
         space: True for a sheet in three dimensions.
         planes: symmetry planes at which only a half or a quarter of the part is modelled.
         drawn: approximate number of drawn states.
@@ -307,7 +307,7 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
     def described(tool):
         return f"{tool:g}" if isinstance(tool, int | float) else f"{tool['start']:g} at first, {tool['back']:g} behind"
     return {"heat": {name: (conductance, described(tool)) for name, (conductance, tool) in heat["tools"].items()},
-            "unit": heat["unit"]}
+            "unit": {"C": "°C"}.get(heat["unit"], heat["unit"])}
 
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
