@@ -10,6 +10,7 @@ async function unpack(id) {
 
 const mix = (a, b, f) => a.map((v, k) => v === null || b[k] === null ? v : v + f * (b[k] - v));
 const narrow = () => window.innerWidth < 700;
+const plain = {exponentformat: "power", gridcolor: "#eceff3", zeroline: false};            // 10^-4, not 100 micro
 const font = {family: "system-ui, Segoe UI, Roboto, sans-serif", size: 13, color: "#1d2530"};
 
 // The place in a run: between states k and j = k + 1, a fraction f on; stages change at once. A run may be one state.
@@ -59,15 +60,21 @@ function sectionTraces(run, at, field, range) {
   sides.forEach(([across, up]) => traces.push({type: "scatter", mode: "lines", fill: "toself", fillcolor: "#30405a",
     line: {color: "#30405a", width: 0.5}, hoverinfo: "skip", showlegend: false,
     x: across([...at.bottom[0], ...[...at.top[0]].reverse()]), y: up([...at.bottom[1], ...[...at.top[1]].reverse()])}));
-  const parts = 6, dense = v => v.flatMap((a, i) => i + 1 < v.length         // or thin walls would be a row of dots
+  const [bottom, top] = [at.bottom, at.top], stations = bottom[0].length, size = Math.max(...box(run).map(([a, b]) => b - a));
+  const wall = Math.max(...bottom[0].map((r, i) => Math.hypot(top[0][i] - r, top[1][i] - bottom[1][i])));
+  const rows = Math.min(Math.max(Math.ceil(wall / (0.0125 * size)), 1), 20);                // of dots through the wall
+  const length = bottom[0].reduce((sum, r, i) => i ? sum + Math.hypot(r - bottom[0][i - 1], bottom[1][i] - bottom[1][i - 1]) : 0, 0);
+  const parts = rows > 1 ? Math.min(Math.ceil(length / (0.005 * size * stations)), 6) : 6;  // between two stations
+  const dense = v => v.flatMap((a, i) => i + 1 < stations
     ? Array.from({length: parts}, (_, k) => a === null ? a : a + k / parts * ((v[i + 1] ?? a) - a)) : [a]);
-  const r = dense(at.bottom[0].map((r, i) => (r + at.top[0][i]) / 2)), z = dense(at.bottom[1].map((z, i) => (z + at.top[1][i]) / 2));
+  const all = list => Array.from({length: rows}, (_, k) => list((k + 0.5) / rows)).flat();
+  const [r, z] = [0, 1].map(axis => all(s => dense(mix(bottom[axis], top[axis], s))));
   sides.forEach(([across, up], n) => traces.push({type: "scatter", mode: "markers", showlegend: false, hovertemplate: "%{text}<extra></extra>",
     x: across(r), y: up(z),
-    text: r.map((_, k) => Math.round(k / parts)).map(i => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
+    text: all(() => dense(bottom[0]).map((_, k) => Math.round(k / parts))).map(i => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
       Object.entries(at.all).map(([label, v]) => stated(label, v[i])).join("<br>")),
-    marker: {size: 6, color: dense(at.values), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
-      cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0,
+    marker: {size: 6, color: all(() => dense(at.values)), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
+      cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0, exponentformat: "power",
       title: {text: narrow() ? "" : field, side: "right"}, ...(narrow() ? {orientation: "h", yref: "container", y: 0, yanchor: "bottom", len: 1} : {})}}}));
   return traces;
 }
@@ -80,7 +87,7 @@ function mesh(run, at, field, range) {
   const image = (points, [sx, sy, sz, dx, dy, dz]) => ({x: points[0].map(x => sx * x + dx), y: points[1].map(y => sy * y + dy),
     z: points[2].map(z => sz * z + dz)}), [i, j, k] = run.mesh.triangles;
   const sheets = run.images.map((map, n) => ({type: "mesh3d", ...image(at.points, map), i, j, k, intensity: at.values,
-    ...paint(field, range), showscale: n === 0, colorbar: {thickness: 12, len: 0.85, title: {text: field, side: "right"}},
+    ...paint(field, range), showscale: n === 0, colorbar: {thickness: 12, len: 0.85, exponentformat: "power", title: {text: field, side: "right"}},
     text: at.values.map(v => stated(field, v)), hovertemplate: "%{text}<extra></extra>"}));
   const tools = run.mesh.tools.flatMap((tool, n) => tool.images.map(map => {
     const points = tool.points.map((v, axis) => v.map(x => x + (at.moved[n] ?? 0) * tool.moves[axis]));
@@ -123,14 +130,14 @@ function process(data) {
   const unit = data.length ? `, ${data.length}` : "";
   const tall = () => { const [r, z] = box(run); return (z[1] - z[0]) / (r[1] - r[0]); };
   const layout = () => ({font, margin: {l: 55, r: 10, t: 10, b: narrow() ? 110 : 45}, hovermode: "closest", showlegend: false,
-    height: Math.min(narrow() ? 470 : 520, (narrow() ? 280 : 480) * tall() + (narrow() ? 180 : 110)), xaxis: {title: `r${unit}`, range: box(run)[0], zeroline: false, gridcolor: "#eceff3",
-    constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", zeroline: false,
-    gridcolor: "#eceff3", constrain: "domain"}, plot_bgcolor: "white"});
+    height: Math.min(narrow() ? 470 : 520, (narrow() ? 280 : 480) * tall() + (narrow() ? 180 : 110)), xaxis: {title: `r${unit}`, range: box(run)[0], ...plain,
+    constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", ...plain,
+    constrain: "domain"}, plot_bgcolor: "white"});
   const scene = () => { const all = box(run), r = all[0], z = all[all.length - 1], deep = run.mesh ? all[1] : run.axisymmetric ? r : [-r[1], r[1]], height = narrow() ? 340 : 420;
     const [x, y, up] = [r, deep, z].map(v => v[1] - v[0]), unit = Math.cbrt(x * y * up);
     const half = (run.axisymmetric ? x : 0.78 * x + 0.63 * y) / unit / 2, high = 0.9 * up / unit / 2 + 0.4 * half;     // as they are seen
     const wide = Math.min((element("solid").clientWidth || height) / height, 1);
-    const far = Math.max(half / wide, high) / 0.41 + half / 2;
+    const far = Math.max(half / wide, high) / 0.41 + half / (run.mesh ? 1 : 2);       // a box has a corner in front
     return {font, margin: {l: 0, r: 0, t: 0, b: 0}, uirevision: run.name,
     height, scene: {aspectmode: "manual", aspectratio: {x: x / unit, y: y / unit, z: up / unit}, camera: {eye: {x: 0.57 * far, y: -0.71 * far, z: 0.42 * far}},
     xaxis: {visible: false, range: r}, yaxis: {visible: false, range: deep}, zaxis: {visible: false, range: z}}}; };
@@ -180,7 +187,7 @@ function charts(data) {
     const figure = document.createElement("figure"), caption = document.createElement("figcaption"),
       plot = document.createElement("div");
     caption.textContent = chart.title; figure.append(caption, plot); element("charts").append(figure);
-    const axis = (title, zero) => ({title, gridcolor: "#eceff3", zeroline: false, ...(zero ? {rangemode: "tozero"} : {})});
+    const axis = (title, zero) => ({title, ...plain, ...(zero ? {rangemode: "tozero"} : {})});
     Plotly.newPlot(plot, chart.traces, {font, height: 330, margin: {l: 60, r: 10, t: 28, b: 45}, plot_bgcolor: "white",
       xaxis: axis(chart.x, chart.zero === "x"), yaxis: axis(chart.y, chart.zero === "y"),
       showlegend: chart.traces.length > 1, legend: {orientation: "h", y: -0.25}}, config);
