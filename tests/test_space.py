@@ -624,8 +624,10 @@ def test_report_warns_of_compression_without_relaxed_energy(tmp_path, monkeypatc
     monkeypatch.setattr(path, "wall", lambda state=None: replace(wall, deformed_points=0.9 * wall.reference_points))
     monkeypatch.setattr(shutil, "which", lambda program: None)
     monkeypatch.delenv("DISPLAY", raising=False)
-    text = path.report(tmp_path / "report.html", density=1.0).read_text()
-    assert ("100 % of the sheet is in compression" in text) == (wrinkles is None) == bool(path.findings())
+    text = path.report(tmp_path / "report.html", density=1.0, units=fx.Units("mm", "MPa")).read_text()
+    assert ("<b>serious</b>: 100 % of the sheet is in compression" in text) == (wrinkles is None)
+    assert bool(path.findings()) == (wrinkles is None)
+    assert "Lengths in mm, stresses in MPa, forces in N." in text and "<h2>Made with</h2>" in text
     assert "No pictures: a 3-D view needs a screen" in text
 
 

@@ -16,7 +16,7 @@ from ...mesh.nodes import COORDINATES
 from ...results import files
 from ...results.show import interactive, page
 from ...results.show.interactive import rounded
-from ...results.show.report import PROCESS, scripts
+from ...results.show.report import PROCESS, finding_element, introduction, scripts, versions
 from ...results.show.report_data import of_path
 from ...results.show.views import look, plotted, shading
 from ...scene.summary import summary
@@ -165,14 +165,10 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
                 break
             if comm.rank == 0:
                 pictures.append(page.picture(target.read_bytes(), caption, "wide"))
-    counts, basis = path.counts, planes.basis(None)
-    body = [f"<h1>{html.escape(title or 'Report of a run')}</h1>",
-            f"<p class=lead>{counts.steps} states after the start, {counts.iterations} Newton iterations,"
-            f" {counts.seconds:.1f} s. Sheet in three dimensions, as a membrane."
-            f"{f' Forces, energies, volumes and areas are given for {basis}.' * bool(basis)}</p>"]
+    body = [f"<h1>{html.escape(title or 'Report of a run')}</h1>", f"<p class=lead>{introduction(record, units)}</p>"]
     if failure is not None:
         body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")
-    body += [f"<p class=note>{html.escape(entry.text)}</p>" for entry in path.findings()]
+    body += map(finding_element, path.findings())
     body += [PROCESS, "<div class=grid>", *pictures, "</div><h2>Key numbers</h2>",
              page.table(["", ""], [list(row) for row in found.rows]), "<h2>Curves</h2><div id=charts class=grid></div>"]
     names = list(dict.fromkeys(state.stage for state in path.states))
@@ -180,7 +176,8 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     ends = [next(s for s in reversed(path.states) if s.stage == name) for name in names]
     body += ["<h2>Stages</h2>", page.table(["stage", *(units.label(c) for c in columns)], [
         [state.stage or "run", *(page.number(state.measures[c]) for c in columns)] for state in ends])]
-    body += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()])]
+    body += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()]),
+             "<h2>Made with</h2>", page.table(["", ""], versions([record]))]
 
     def make() -> None:
         """Write the HTML page of the report, on rank 0."""

@@ -132,7 +132,7 @@ def _page(records: list[ReportData], names: list[str], parts: list, title: str, 
         units: units of the script.
     """
     alone = len(records) == 1
-    body = [f"<h1>{html.escape(title)}</h1>", *(f"<p class=lead>{_lead(record, units)}</p>" for record in records[:1])]
+    body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{introduction(records[0], units)}</p>"]
     for record, name in zip(records, names):
         body += _trouble(failure or record.failure, "" if alone else f"{name}: ")
     body += [_warnings(record, "" if alone else f"{name}: ") for record, name in zip(records, names)]
@@ -144,7 +144,7 @@ def _page(records: list[ReportData], names: list[str], parts: list, title: str, 
     for record, name in zip(records, names):
         body += [] if alone else [f"<h2>{html.escape(name)}</h2>"]
         body += _details(record, units)
-    body += ["<h2>Made with</h2>", page.table(["", ""], _versions(records))]
+    body += ["<h2>Made with</h2>", page.table(["", ""], versions(records))]
     return page.page(title, body, scripts(interactive.data(records, names, units)))
 
 
@@ -217,21 +217,25 @@ def _warnings(record: ReportData, lead: str = "") -> str:
     findings = record.all_findings()
     if record.space:
         lead = f"<p class=note>{html.escape(lead)}Only curves and inputs are shown: {_NO_MESH}.</p>"
-        return lead + "".join(map(_finding, findings))
+        return lead + "".join(map(finding_element, findings))
     if not findings:
         return (f"<p class=good>{html.escape(lead)}No warnings: the target was met. Mass, volume of the elements and"
                 f" penetration are within bounds. No face crosses another or the axis.</p>")
-    return "".join(_finding(found._replace(text=lead + found.text)) for found in findings)
+    return "".join(finding_element(found._replace(text=lead + found.text)) for found in findings)
 
 
-def _finding(found: Finding) -> str:
-    """Return a finding as an HTML element."""
+def finding_element(found: Finding) -> str:
+    """Return a finding as an HTML element; the page shows two lines, and after a click the whole text."""
     return (f"<details class='note{' bad' if found.severity != 'note' else ''}'><summary><b>{found.severity}</b>:"
             f" {html.escape(found.text)}</summary></details>")
 
 
-def _versions(records: list[ReportData]) -> list[list[str]]:
-    """Return rows (name, value) of a table: date of the report, scripts, and versions of programs."""
+def versions(records: list[ReportData]) -> list[list[str]]:
+    """Return rows (name, value) of a table: date of the report, scripts of the runs, and versions of programs.
+
+    Args:
+        records: the runs.
+    """
     try:
         version = importlib.metadata.version("formingx")
     except importlib.metadata.PackageNotFoundError:
@@ -286,8 +290,13 @@ def _answers(records: list[ReportData], names: list[str], parts: list, units: Un
     return page.table(["", *names] if len(records) > 1 else ["", ""], rows)
 
 
-def _lead(record: ReportData, units: Units) -> str:
-    """Return sentences on the numbers of states and iterations of a run, on the kinematics and on the units."""
+def introduction(record: ReportData, units: Units) -> str:
+    """Return sentences on the numbers of states and iterations of a run, on the kinematics and on the units, as HTML.
+
+    Args:
+        record: the run.
+        units: units of the script.
+    """
     counts = record.counts
     size = f"{len(record.kinds) - 1} states after the start"
     if counts:
