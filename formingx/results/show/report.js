@@ -130,7 +130,7 @@ function process(data) {
   const unit = data.length ? `, ${data.length}` : "";
   const tall = () => { const [r, z] = box(run); return (z[1] - z[0]) / (r[1] - r[0]); };
   const layout = () => ({font, margin: {l: 55, r: 10, t: 10, b: narrow() ? 110 : 45}, hovermode: "closest", showlegend: false,
-    height: Math.min(narrow() ? 470 : 520, (narrow() ? 280 : 480) * tall() + (narrow() ? 180 : 110)), xaxis: {title: `r${unit}`, range: box(run)[0], ...plain,
+    height: Math.min(narrow() ? 470 : 520, (narrow() ? 280 : 480) * tall() + (narrow() ? 180 : 110)), xaxis: {title: {text: `r${unit}`, standoff: 8}, range: box(run)[0], ...plain,
     constrain: "domain"}, yaxis: {title: `z${unit}`, range: box(run)[1], scaleanchor: "x", ...plain,
     constrain: "domain"}, plot_bgcolor: "white"});
   const scene = () => { const all = box(run), r = all[0], z = all[all.length - 1], deep = run.mesh ? all[1] : run.axisymmetric ? r : [-r[1], r[1]], height = narrow() ? 340 : 420;
@@ -187,10 +187,10 @@ function charts(data) {
     const figure = document.createElement("figure"), caption = document.createElement("figcaption"),
       plot = document.createElement("div");
     caption.textContent = chart.title; figure.append(caption, plot); element("charts").append(figure);
-    const axis = (title, zero) => ({title, ...plain, ...(zero ? {rangemode: "tozero"} : {})});
+    const axis = (title, zero) => ({title: {text: title, standoff: 8}, ...plain, ...(zero ? {rangemode: "tozero"} : {})});
     Plotly.newPlot(plot, chart.traces, {font, height: 330, margin: {l: 60, r: 10, t: 28, b: 45}, plot_bgcolor: "white",
       xaxis: axis(chart.x, chart.zero === "x"), yaxis: axis(chart.y, chart.zero === "y"),
-      showlegend: chart.traces.length > 1, legend: {orientation: "h", y: -0.25}}, config);
+      showlegend: chart.traces.length > 1, legend: {orientation: "h", y: -0.3}}, config);
   });
 }
 
