@@ -71,7 +71,7 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
     """
     def with_unit(value: float, symbol: str = "") -> str:
         return f"{value:.4g} {symbol}".rstrip()
-    rows = [(f"at {name}" if name else "", "")] if name else []
+    rows = [("temperature", name)] if name else []
     rows.append(("instantaneous shear modulus", with_unit(material.shear_modulus, unit)))
     for mode in MODES:
         largest = material.largest_stretch(mode)
@@ -118,15 +118,18 @@ def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str,
         axis.set(title=mode.replace("_", " "), xlabel="stretch", ylabel="true stress" + f", {unit}" * bool(unit),
                  yscale="log" if rates else "linear")
     if rates or len(cases) > 1:
-        axes[0].legend(frameon=False, fontsize="small")
+        words = ["temperature"] * bool(cases[0][0]) + ["rate"] * bool(rates)
+        axes[0].legend(frameon=False, fontsize="small", title=": ".join(words))
     out = io.BytesIO()
     drawn.savefig(out, format="png", dpi=110)
     return base64.b64encode(out.getvalue()).decode()
 
 
 _PAGE = """<!doctype html><html lang="en"><meta charset="utf-8"><title>{title}</title>
-<style>body {{font: 16px sans-serif; max-width: 72rem; margin: 2rem auto; padding: 0 1rem}}
-td {{padding: .2rem 1rem .2rem 0}} img {{max-width: 100%}} code {{overflow-wrap: anywhere}}</style>
+<meta name="viewport" content="width=device-width, initial-scale=1">
+<style>body {{font: 15px/1.5 system-ui, "Segoe UI", Roboto, sans-serif; color: #1d2530; max-width: 72rem;
+margin: 2rem auto; padding: 0 1rem}} table {{border-collapse: collapse}} img {{max-width: 100%}}
+td {{padding: .3rem 1rem .3rem 0; border-bottom: 1px solid #e3e7ec}} code {{overflow-wrap: anywhere}}</style>
 <h1>{title}</h1><p><code>{card}</code></p>
 <img alt="true stress against stretch in three tests" src="data:image/png;base64,{picture}">
 <h2>Limits</h2><table>{rows}</table>
