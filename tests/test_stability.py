@@ -231,6 +231,18 @@ def test_forming_a_pot_and_a_bottle_is_stable():
     assert path.stability(range(7), 12).bifurcations == []
 
 
+@pytest.mark.parametrize("friction", ["none", 0.3, "stick"])
+def test_a_sheet_under_a_plug_is_stable_with_friction(friction):
+    """Coulomb friction makes the tangent unsymmetric; a sliding point is no unstable mode."""
+    sheet = fx.mesh.disc(radius=33.0, thickness=0.8, elements=(30, 1))
+    plug = fx.tools.cylinder(radius=19.2, z=0.8, fillet=8.0)
+    scene = fx.Scene(mesh=sheet, materials=fx.NeoHookean(c10=0.3),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                     contacts=[fx.Contact("top", plug, friction, direction=(0, -1))])
+    path = fx.trace(scene, until=fx.travel(6.0), progress=False)
+    assert not path.limit_points and len(path.stability([0, 2]).critical_points) == 0
+
+
 def test_membranes_and_loads_without_second_variation_are_refused():
     path = fx.trace(treloar(model=fx.Membrane()), until=fx.pole_height(1.0), progress=False)
     with pytest.raises(InputError, match="membrane"):

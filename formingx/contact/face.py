@@ -11,6 +11,7 @@ from ..forms.history import Start
 from ..forms.transfer import MovingLeastSquares
 from ..physics.contact import Contact
 from ..physics.contact_law import ContactHistory, Tractions
+from ..physics.penalty import symmetric_stiffness
 from .face_history import FaceHistory
 from .increment import Increment
 from .rule import Gauss, Lobatto, Rule, Vertices
@@ -230,18 +231,18 @@ class FaceContact:
         """
         return self._of_unknowns(self._stiffness(fields, control, False))
 
-    def hoop_stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the derivative of circumferential contact forces by circumferential motions of the nodes.
+    def mode_stiffness(self, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the stiffness of the points in the section and round the axis, for the second variation of modes.
 
-        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless. The
-        shape is (n, k, k) with the k nodes of each point. The second variation of non-axisymmetric modes uses it.
+        Shapes: (n, m, m), symmetric, with the m unknowns of each point; (n, k, k) with its k nodes. fields: locally
+        owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
         """
         radius = np.full(len(self.points), np.inf)
         if self._solid.scene.kinematics.axisymmetric:
             radius = self.points[:, 0] + self._length * self.displacement(fields)[:, 0]
-        both = np.zeros_like(self._in_tangent)
-        both[:, 0, 0] = self.law.hoop_stiffness(self.positions(fields, control), self.history, radius)
-        return self._of_unknowns(both)[:, ::2, ::2]
+        both, x = np.zeros_like(self._in_tangent), self.positions(fields, control)
+        both[:, 0, 0] = self.law.hoop_stiffness(x, self.history, radius)
+        return self._of_unknowns(symmetric_stiffness(self.law, x, self.history)), self._of_unknowns(both)[:, ::2, ::2]
 
     def one_sided_change(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the one-sided stiffness of the points minus their stiffness in the last tangent.

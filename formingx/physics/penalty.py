@@ -11,7 +11,7 @@ from .._jit import NULL, address
 from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
 from .compiled_penalty import compiled
-from .contact_law import ContactHistory, Motion, NormalLaw, Tractions
+from .contact_law import ContactHistory, ContactLaw, Motion, NormalLaw, Tractions, outer
 
 STICKS = 100.0
 """Coefficient of friction from which on a point counts as sticking."""
@@ -332,6 +332,29 @@ class Law(NormalLaw):
         if self._past is None or self._past[0] is not old:
             self._past = old, [address(values) for values in old]
         return self._past[1]
+
+
+def symmetric_stiffness(law: ContactLaw, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
+    """Return a symmetric stiffness of points in a section, for the second variation of the energy.
+
+    Friction couples the tangential traction to the normal displacement, by mu times the penalty where a point slides.
+    This coupling has no energy, and its symmetric part would count every such point as an unstable mode. It is left
+    out: a sliding point has the stiffness of the normal traction, a sticking point that of its elastic slip in
+    addition.
+
+    Args:
+        law: contact law of the points.
+        x: positions relative to the tool, shape (n, 2), length.
+        old: history variables of the last accepted state; None: there are none.
+
+    Returns:
+        Stiffness, shape (n, 2, 2), stress/length.
+    """
+    if not law.has_friction:
+        return law.tractions(x, old).stiffness
+    tangent = law.nearest(x).tangent
+    sticking = law.hoop_stiffness(x, old, np.full(len(x), np.inf))
+    return law.with_friction(0.0).tractions(x, old).stiffness + outer(tangent, sticking[:, None] * tangent)
 
 
 def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:

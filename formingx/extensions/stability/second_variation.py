@@ -15,9 +15,9 @@ with H from `Kinematics.mode_gradient`. Each term is the second derivative of th
 serves all n. At n = 0, V is torsion, and U and W give the tangent of the path. Amplitudes are normalised alike at all n
 (the mean of cos^2 round the axis is 1/2, not 1).
 
-Friction has no energy, and a follower pressure has one only on a closed face or with a fixed rim: the symmetric part of
-their tangents is used. A sliding point is free round the axis, which gives a lower bound of critical loads. A relaxing
-material has its instantaneous stiffness.
+A follower pressure has an energy only on a closed face or with a fixed rim: the symmetric part of its tangent is used.
+Friction has none: a sliding point has the stiffness of the normal traction alone, so it is free along the tool, also
+round the axis. This gives a lower bound of critical loads. A relaxing material has its instantaneous stiffness.
 
 The unknowns are (U, W, V + m U, Q), with m = 1 for n = 1 and 0 else. So the quantity that vanishes on the axis is an
 unknown.
@@ -393,9 +393,7 @@ class SecondVariation:
             fields: locally owned unknowns of the problem.
             m: 1 for modes of one wave round the axis, else 0. The third unknown is V + m U with the hoop amplitude V.
         """
-        control = self.problem.control
-        plane = contact.stiffness(fields, control)
-        plane, turn = (plane + plane.transpose(0, 2, 1)) / 2, contact.hoop_stiffness(fields, control)
+        plane, turn = contact.mode_stiffness(fields, self.problem.control)
         dofs = self._to_mode[contact.rule.dofs]
         k = dofs.shape[1]
         values = np.zeros((len(dofs), k + k // 2, k + k // 2))
