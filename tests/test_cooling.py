@@ -194,3 +194,22 @@ def test_a_warning_names_a_mesh_too_coarse_for_heat(caplog):
         _, there, found = laid_on(proposed)
         error = np.abs(found - np.interp(there, z[order], T[order])).max()
         assert error < 2e-3 * 120 and "in space" not in caplog.text
+
+
+def test_a_warning_names_the_end_of_a_contact(caplog):
+    """A sheet lies on a colder tool up to half of its radius: elements along it, not through it, decide the error."""
+    heat = fx.Cooling(fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0), unit="C",
+                      tools={"table": (1000.0, 30.0)}, tolerance=2.0)
+    errors = []
+    for elements in (10, [1, 1, 2, 3]), (10, [1, 1, 2, 2, 4, 4, 6, 6]), (40, [1, 1, 2, 3]):
+        tool = fx.tools.cylinder(radius=5e-3, z=0.0).mirrored()
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=0.01, thickness=1e-3, elements=elements), temperature=150.0,
+                         heat=heat, materials=fx.NeoHookean(c10=1e6),
+                         supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                         contacts=[fx.Contact("bottom", tool, "none", name="table")])
+        caplog.clear()
+        fx.Process(scene).run([fx.Stage("lie", duration=5.0)], progress=False)
+        found = re.search(r"about (.*?) degrees at time .* at \(R, Z\) = \(0\.005.*, 0\), where contact with 'table'"
+                          r" ends: use shorter elements along the face", caplog.text)
+        errors.append(float(found.group(1)))
+    assert errors[1] > 0.8 * errors[0] and errors[2] < 0.7 * errors[0], errors

@@ -191,8 +191,8 @@ class Conduction(HeatVectors):
                 break
         raise ConvergenceError("heat: Newton's method did not converge in a step")
 
-    def difference(self, known: list[np.ndarray], c: float) -> float:
-        r"""Return the largest temperature change that given heats cause in a linearised implicit step.
+    def difference(self, known: list[np.ndarray], c: float) -> tuple[float, np.ndarray]:
+        r"""Return the temperature changes that given heats cause in a linearised implicit step.
 
         .. math:: (M - c R') \Delta = k
 
@@ -205,7 +205,7 @@ class Conduction(HeatVectors):
             c: factor c of the rates of heat in the step, time.
 
         Returns:
-            Largest absolute change of body and tools over all ranks, degrees.
+            Largest absolute change of body and tools over all ranks, degrees. Change of the body, shape (n,), degrees.
         """
         responses = [touch.response(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
         self._factorise(c, responses, afresh=False)
@@ -216,7 +216,7 @@ class Conduction(HeatVectors):
         sizes = [self._largest(change)]
         for touch, response, k in zip(self.tool_contacts, responses, known[1:]):
             sizes.append(self._largest(touch.flux_and_change(response, k, change[touch.dofs], c)[1]))
-        return max(sizes)
+        return max(sizes), change
 
     def slope(self, rate: np.ndarray) -> np.ndarray:
         """Return dT/dt of the body from its rates of heat M dT/dt, with the capacity matrix M.

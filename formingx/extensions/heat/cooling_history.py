@@ -14,6 +14,7 @@ from ...forms.history import Start
 from ...forms.transfer import MovingLeastSquares
 from ...mesh.nodes import matching_rows
 from ...ranks import combined, gathered, listed
+from ...results.numbers import without_round_off
 from ...values.temperature import ABSOLUTE_ZERO
 from ...values.tolerances import EXAMINED_STATES, WARNED_ERROR
 from . import stepping
@@ -104,6 +105,10 @@ class CoolingHistory:
         Returns:
             Largest error in each state, degrees, shape (states,).
         """
+        return np.array([error for error, _ in self._space_errors(states)])
+
+    def _space_errors(self, states: Sequence[Any]) -> list[tuple[float, str]]:
+        """Return the errors of `errors_in_space`, each with the end of a contact at its place as text, or ""."""
         finer, power, found = self._conduction(degree=3), self._body.power, []
         estimator, tool_contacts = SpaceError(self._body, finer), self._tool_contacts(finer)
         try:
@@ -113,11 +118,24 @@ class CoolingHistory:
                     for body, touching in ((self._body, self._contacts), (finer, tool_contacts)):
                         _set_conductances(body, touching, state.control)
                         body.update()
-                    found.append(estimator.largest(self._state, self._time))
+                    found.append((estimator.largest(self._state, self._time), self._contact_end(estimator.place)))
         finally:
             self._body.power = power
             estimator.destroy()
-        return np.array(found)
+        return found
+
+    def _contact_end(self, place: np.ndarray) -> str:
+        """Return the end of a contact at a reference position, shape (2,), length, as text; "" if there is none.
+
+        A contact ends there if only some of the three nearest nodes of its face touch the tool.
+        """
+        for touch, contact, _ in self._contacts:
+            nodes = gathered(self._problem.comm, np.column_stack([touch.points, touch.conductance > 0]))
+            nearest = np.argsort(np.linalg.norm(nodes[:, :2] - place, axis=1))[:3]
+            if 0 < nodes[nearest, 2].sum() < len(nearest):
+                R, Z = without_round_off(place, nodes[:, :2])
+                return f" at (R, Z) = ({R:.4g}, {Z:.4g}), where contact with {contact.contact.label!r} ends"
+        return ""
 
     def findings(self, states: Sequence[Any]) -> list[Finding]:
         """Return a warning if the mesh is too coarse for the temperatures of a run; collective.
@@ -137,7 +155,7 @@ class CoolingHistory:
         looked = sorted({*np.linspace(0, len(states) - 1, EXAMINED_STATES).astype(int).tolist(),
                          *(k - 1 for k in begun)})
         looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
-        errors = self.errors_in_space([states[k] for k in looked])
+        errors, ends_of_contact = zip(*self._space_errors([states[k] for k in looked]))
         temperatures = [states[k].history_variables[-1].temperature for k in looked]      # the temperature is last
         scene, comm = self._problem.scene, self._problem.comm
         ends = listed(comm, [float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
@@ -149,9 +167,12 @@ class CoolingHistory:
         low, high = self._cooling.extremes(scene)
         most = max(span, high - low) if np.isfinite(high - low) else span          # no error is larger
         error = f"is about {errors[worst]:.2g}" if errors[worst] < most else f"may be the whole span, {most:.3g}"
+        end = ends_of_contact[worst]
+        advice = ("use shorter elements along the face there; thinner ones do not reduce this error" if end else
+                  f"use thinner elements at faces that touch a tool or lose heat"
+                  f"{_finer_elements(scene, min(errors[worst], most) / allowed, duration)}")
         return [Finding("warning", "temperature", f"The error of the temperature in space {error} degrees at time"
-                        f" {states[looked[worst]].time:.4g}: use thinner elements at faces that touch a tool or"
-                        f" lose heat{_finer_elements(scene, min(errors[worst], most) / allowed, duration)}.")]
+                        f" {states[looked[worst]].time:.4g}{end}: {advice}.")]
 
     def start(self) -> None:
         """Set the initial temperatures of body and tools, at time 0."""

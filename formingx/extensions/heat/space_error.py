@@ -12,6 +12,7 @@ Anal. 41 (2003) 1585-1594.
 import numpy as np
 from dolfinx import fem
 
+from ...ranks import gathered
 from .conduction import Conduction
 from .contact import HeatContact
 
@@ -22,11 +23,15 @@ class SpaceError:
     Args:
         body: heat equation of the run, with quadratic elements.
         finer: heat equation of the same body with cubic elements; `destroy` frees it.
+
+    Attributes:
+        place: reference position of the largest error in the body that `largest` estimated last, shape (2,), length.
     """
 
     def __init__(self, body: Conduction, finer: Conduction):
         self._body, self._finer = body, finer
         self._values, self._cubic_values = fem.Function(body.space), fem.Function(finer.space)
+        self.place: np.ndarray = np.zeros(2)
 
     def largest(self, state: list[np.ndarray], time: float) -> float:
         """Estimate the largest discretisation error of the temperature in a state; collective.
@@ -49,7 +54,11 @@ class SpaceError:
                     for each in zip(body.tool_contacts, finer.tool_contacts, state[1:], strict=True)]
         rates, _ = finer.rates([self._in_cubic_space(state[0]), *in_tools])
         residual = time * (rates[0] - finer.mass(self._in_cubic_space(slope)))
-        return finer.difference([residual, *map(np.zeros_like, in_tools)], time)
+        error, change = finer.difference([residual, *map(np.zeros_like, in_tools)], time)
+        own = np.column_stack([np.abs(change), finer.points])
+        rows = gathered(body.comm, own[np.argsort(own[:, 0])[-1:]])
+        self.place = rows[np.argmax(rows[:, 0]), 1:3]
+        return error
 
     def destroy(self) -> None:
         """Free the PETSc objects of `finer` (collective)."""

@@ -56,7 +56,7 @@ def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
     third = body.stage(state, known, c, second.changes[0])
     rates = (first, second.rates, third.rates)
     errors = [dt * sum(w * r for w, r in zip(_ERROR, parts)) for parts in zip(*rates)]
-    error = body.difference(errors, c)
+    error, _ = body.difference(errors, c)
     change = third.changes
     missing = body.mass(change[0]) - dt * sum(w * r[0] for w, r in zip(WEIGHTS, rates))
     through = dt * (WEIGHTS @ np.array([heats_first, second.heats, third.heats]))
