@@ -16,6 +16,7 @@ class Knots:
     """A function of a length from 0 to 1 that is given by its values at equidistant knots.
 
     The argument of the function is one length or an array of lengths. Lengths outside 0 to 1 count as the nearest end.
+    Lengths below -1 or above 2 are refused: they are lengths of the body that were not divided by its length.
 
     Args:
         values: values at the k knots, shape (k,).
@@ -25,6 +26,9 @@ class Knots:
         values: values at the k knots, shape (k,).
         smooth: True for a cubic spline through the knots, False for straight lines between them.
         coordinates: lengths of the knots, from 0 to 1, shape (k,).
+
+    Raises:
+        InputError: the function is called with a length that is not from 0 to 1.
     """
 
     def __init__(self, values: Any, smooth: bool = False):
@@ -32,6 +36,11 @@ class Knots:
         self.coordinates = np.linspace(0.0, 1.0, len(self.values))
 
     def __call__(self, s: Any) -> Any:
+        far = np.abs(np.subtract(s, 0.5)) > 1.5
+        if np.any(far):
+            raise InputError(f"spline: the profile was called with {np.asarray(s)[far].flat[0]:.4g}: must be a length"
+                             f" from 0 to 1; divide by the length of the body, as in thickness=lambda R: wall(R / 60.0)"
+                             f" for a sheet of radius 60")
         s = np.clip(s, 0.0, 1.0)
         return self._spline(s) if self.smooth else np.interp(s, self.coordinates, self.values)
 
@@ -73,7 +82,8 @@ class Spline:
 def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, smooth: bool = False) -> Spline:
     """Return a design parameter that is a profile of thickness, temperature or a material constant.
 
-    The function that builds the scene receives the profile as a function (`Knots`) of a length from 0 to 1.
+    The function that builds the scene receives the profile as a function (`Knots`) of a length from 0 to 1. For a sheet
+    of radius 60 its thickness is `lambda R: wall(R / 60)`.
 
     Args:
         knots: number k of equidistant knots, 2 or more; with `smooth` 4 or more.
