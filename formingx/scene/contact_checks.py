@@ -48,7 +48,9 @@ def check_start(scene: Any, contact: Contact) -> None:
     if depth[worst] > near:
         free = contact.tool.reversed().signed_distance(points).max() <= near
         size, length = np.ptp(contact.tool.bounds, axis=0).max(), max(scene.extent)
-        why = ("; the other side of its profile is free of it: use tool.reversed()" if free else "")
+        why = ("; the other side of its profile is free of it: use tool.reversed()" if free else
+               "; on this side it must stand upside down: use tool.mirrored(), and moved(z=...) to its place"
+               if _fits_upside_down(contact, face, points, near) else "")
         if not length < OTHER_UNIT * size:
             why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"
                    f" and cm)?")
@@ -61,6 +63,22 @@ def check_start(scene: Any, contact: Contact) -> None:
         raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
                          f" no tool faces the pressure")
     tool_width.check(mesh, contact, scene.kinematics.axisymmetric)
+
+
+def _fits_upside_down(contact: Contact, face: np.ndarray, points: np.ndarray, near: float) -> bool:
+    """Return True if the tool, mirrored and moved along Z to where it touches a face, is free of the body.
+
+    Args:
+        contact: the `Contact`.
+        face: positions of the nodes of the face, shape (m, 2), length.
+        points: positions of all nodes of the body, shape (n, 2), length.
+        near: round-off of a length.
+    """
+    tool = contact.tool.mirrored()
+    low, high = tool.bounds[:, 1]
+    below = tool.moved(z=face[:, 1].min() - high)
+    above = tool.moved(z=face[:, 1].max() - low)
+    return any(moved.signed_distance(points).max() <= near for moved in (below, above))
 
 
 def check_travel(scene: Any, contact: Contact, travel: float) -> None:

@@ -9,6 +9,10 @@ from mpi4py import MPI
 from ..errors import InputError
 from ..physics.supports import Constrained
 
+_PRESSED = ("; tools hold only what touches them: of a body between two plates model one half, with Symmetry in its"
+            " middle plane")
+"""Advice for a body that tools alone would hold."""
+
 
 def check_driven(supports: Sequence[Any]) -> None:
     """Check that no support drives a displacement component that another support constrains or drives.
@@ -87,8 +91,8 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
     if values[0] < 1e-12:
         free = names[int(np.argmax(np.abs(vectors[:, 0])))]
         raise InputError(f"Scene: too little support: the body is free to move as a rigid body ({free});"
-                         f" supports are {supports!r}; hold that motion, with Clamped or SimplySupported"
-                         f" for one")
+                         f" supports are {supports!r}; constrain that motion, for example by Clamped or"
+                         f" SimplySupported{_PRESSED if scene.contacts else ''}")
 
 
 def check_hinges(scene: Any) -> None:
