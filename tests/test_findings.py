@@ -148,6 +148,10 @@ def test_tool_without_contact():
     away = fx.Process(scene).run([fx.Stage("plug", control="plug", until=fx.travel(-3.0))], progress=False)
     assert "met nothing on its travel of -3: the gap was" in warnings_about(away, "plug")[0]
     assert "its first travel is -3" in warnings_about(away, repr(scene.contacts[0]))[0]
+    lies = fx.Contact("top", fx.tools.cylinder(radius=4.0, z=0.5, fillet=1.0), 0.3, direction=(0, 1), name="plug")
+    stages = [fx.Stage("plug", control="plug", until=fx.travel(2.0))]
+    away = fx.Process(sheet(contacts=[lies])).run(stages, progress=False)
+    assert "the gap was 0 at first and 2 at the end" in warnings_about(away, "plug")[0]
     stages = [fx.Stage("plug", control="plug", until=fx.travel(1.0))]
     near = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", direction=(0, -1), name="plug")
     assert warnings_about(fx.Process(sheet(contacts=[near])).run(stages, progress=False), "plug") == []

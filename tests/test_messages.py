@@ -105,6 +105,13 @@ REFUSED = [
     (lambda: fx.trace(scene(loads=[fx.Pressure("bottom", 0.1)]), until=fx.pressure(1.0)), "nothing is driven"),
     (lambda: fx.solve(scene(loads=[fx.Pressure("bottom", 0.1)]), to=1.0), "nothing is driven"),
     (lambda: scene(contacts=[fx.Contact("top", CUP.reversed())]), r"starts inside the tool.*use tool.reversed\(\)"),
+    (lambda: scene(contacts=[fx.Contact("bottom", fx.tools.sphere(radius=0.2), direction=(0, 1))]),
+     r"starts inside the tool.*upside down: use tool.mirrored\(\)"),
+    (lambda: scene(supports=[fx.Symmetry("axis")], contacts=[fx.Contact("top", CUP)]),
+     "too little support.*translation along Z.*tools hold only what touches them.*model one half"),
+    (lambda: fx.Design(lambda wall: (scene(mesh=fx.mesh.disc(radius=60.0, thickness=wall, elements=(4, 1))),
+                                     fx.pressure(0.1)), {"wall": fx.spline(3, 1.0)}).run(),
+     "the profile was called with .*: must be a length from 0 to 1; divide by the length of the body"),
     # materials
     (lambda: fx.Ogden(mu=1.0, alpha=-2.0), r"mu = 1.0, alpha = -2.0 has mu alpha <= 0.*mu alpha > 0"),
     (lambda: fx.Ogden(mu=1.0, alpha=0.0), "mu alpha <= 0"),
@@ -406,6 +413,14 @@ def test_the_last_state_of_a_path_is_found_by_a_value_of_six_digits():
     found = path.state_at(fx.pole_height(0.512346))
     assert found.measures["pole_height"] == pytest.approx(0.512346, rel=1e-10)
     assert path.last.measures["pressure"] < found.measures["pressure"] < (1 + 1e-5) * path.last.measures["pressure"]
+
+
+def test_a_film_of_too_long_elements_names_them():
+    film = fx.mesh.disc(radius=0.04, thickness=1e-6, elements=(20, 1))
+    with pytest.raises(fx.ConvergenceError, match="elements are too long for their height.*or Membrane") as error:
+        fx.trace(scene(mesh=film, materials=fx.MooneyRivlin(c10=1.0, c01=0.03)), until=fx.pole_stretch(1.1),
+                 progress=False)
+    assert "touches" not in str(error.value)
 
 
 def test_no_state_is_found_beyond_a_maximum_of_the_pressure():

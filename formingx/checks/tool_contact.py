@@ -37,7 +37,7 @@ def untouched(path: Any) -> Iterator[Finding]:
         touched = any(_touches(problem, state, contacts) for state in _states_with_contact(path, active[1:], name))
         start, end = (_distances(problem, state, contacts) for state in (active[0], active[-1]))
         law, tool = contacts[0].contact, contacts[0].contact.name or contacts[0].contact.on
-        gaps = f"the gap was {start.min():.4g} at first and {end.min():.4g} at the end"
+        gaps = f"the gap was {start.min() + 0.0:.4g} at first and {end.min() + 0.0:.4g} at the end"      # not "-0"
         if law.direction is None and any(entry.contact in mould_contacts for entry in contacts) and \
                 end.mean() > start.mean() + contacts[0].thickness:
             yield Finding("warning", tool, f"the body moved away from this mould: the mean distance of its face"
