@@ -107,6 +107,8 @@ REFUSED = [
     (lambda: scene(contacts=[fx.Contact("top", CUP.reversed())]), r"starts inside the tool.*use tool.reversed\(\)"),
     (lambda: scene(contacts=[fx.Contact("bottom", fx.tools.sphere(radius=0.2), direction=(0, 1))]),
      r"starts inside the tool.*upside down: use tool.mirrored\(\)"),
+    (lambda: scene(contacts=[fx.Contact("bottom", fx.tools.male(radius=0.3, height=0.2), direction=(0, 1))]),
+     r"starts inside the tool.*move it away from the body \(tool.moved\)"),
     (lambda: scene(supports=[fx.Symmetry("axis")], contacts=[fx.Contact("top", CUP)]),
      "too little support.*translation along Z.*tools hold only what touches them.*model one half"),
     (lambda: fx.Design(lambda wall: (scene(mesh=fx.mesh.disc(radius=60.0, thickness=wall, elements=(4, 1))),
@@ -413,6 +415,16 @@ def test_the_last_state_of_a_path_is_found_by_a_value_of_six_digits():
     found = path.state_at(fx.pole_height(0.512346))
     assert found.measures["pole_height"] == pytest.approx(0.512346, rel=1e-10)
     assert path.last.measures["pressure"] < found.measures["pressure"] < (1 + 1e-5) * path.last.measures["pressure"]
+
+
+def test_a_clamp_is_pressed_from_the_side_of_its_lower_ring():
+    """The pressure acts on the face of the lower ring, and presses the sheet onto the upper one."""
+    upper, lower = fx.tools.plane(z=0.1), fx.tools.plane(z=0.0).mirrored()
+    sheet = fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1))
+    clamped = scene(mesh=sheet, contacts=[fx.Contact("top", upper, "none"), fx.Contact("bottom", lower, "none")])
+    assert clamped.driven is clamped.loads[0]
+    with pytest.raises(fx.InputError, match="no tool faces the pressure"):
+        scene(mesh=sheet, contacts=[fx.Contact("bottom", lower, "none")])
 
 
 def test_a_film_of_too_long_elements_names_them():

@@ -50,7 +50,7 @@ def check_start(scene: Any, contact: Contact) -> None:
         size, length = np.ptp(contact.tool.bounds, axis=0).max(), max(scene.extent)
         why = ("; the other side of its profile is free of it: use tool.reversed()" if free else
                "; on this side it must stand upside down: use tool.mirrored(), and moved(z=...) to its place"
-               if _fits_upside_down(contact, face, points, near) else "")
+               if _fits_upside_down(contact, face, points, near) else "; move it away from the body (tool.moved)")
         if not length < OTHER_UNIT * size:
             why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"
                    f" and cm)?")
@@ -59,7 +59,8 @@ def check_start(scene: Any, contact: Contact) -> None:
     if depth[worst] > contact.tool.signed_distance(face).max() + near:
         raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
                          f" boundaries are {list(mesh.boundaries)}")
-    if any(load is scene.driven and load.on == contact.on for load in scene.loads):
+    if any(load is scene.driven and load.on == contact.on for load in scene.loads) and all(
+            other.on == contact.on for other in scene.contacts):
         raise InputError(f"{contact!r}: the driven pressure acts on the same face and pushes it away from the tool:"
                          f" no tool faces the pressure")
     tool_width.check(mesh, contact, scene.kinematics.axisymmetric)
