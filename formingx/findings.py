@@ -42,6 +42,11 @@ class Finding(NamedTuple):
         return f"{self.severity}: {self.about}: {self.text}"
 
 
+def percent(share: float) -> str:
+    """Return a share as text in per cent, with two digits that count, such as "1.5 %" or "120 %"."""
+    return f"{float(f'{100 * share:.2g}'):g} %"
+
+
 class Check(Protocol[Subject]):
     """Interface of a check: a function of its subject.
 

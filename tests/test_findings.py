@@ -9,7 +9,7 @@ from conftest import treloar
 import formingx as fx
 from formingx.checks.check import before_run
 from formingx.checks.mould_side import moulds
-from formingx.findings import SEVERITIES, Finding, register, worst_first
+from formingx.findings import SEVERITIES, Finding, percent, register, worst_first
 from formingx.results.evaluate import volume
 from formingx.results.files import checkpoint_data, status
 
@@ -152,6 +152,9 @@ def test_tool_without_contact():
     stages = [fx.Stage("plug", control="plug", until=fx.travel(2.0))]
     away = fx.Process(sheet(contacts=[lies])).run(stages, progress=False)
     assert "the gap was 0 at first and 2 at the end" in warnings_about(away, "plug")[0]
+    stages.append(fx.Stage("back", control="plug", until=fx.travel(0.0)))
+    away = fx.Process(sheet(contacts=[lies])).run(stages, progress=False)
+    assert "met nothing on its travel of 2: " in warnings_about(away, "plug")[0]
     stages = [fx.Stage("plug", control="plug", until=fx.travel(1.0))]
     near = fx.Contact("top", fx.tools.sphere(radius=4.0, z=0.5), "none", direction=(0, -1), name="plug")
     assert warnings_about(fx.Process(sheet(contacts=[near])).run(stages, progress=False), "plug") == []
@@ -164,3 +167,7 @@ def test_findings_of_a_scene_belong_to_its_path():
     path = fx.trace(sheet(c10=4e5), until=fx.pole_height(0.1), progress=False)
     assert path.findings()[0].about == "materials['sheet']" and "mould" in [f.about for f in path.findings()]
     assert [f.about for f in path.findings()] == ["materials['sheet']", "mould"]
+
+
+def test_shares_are_written_without_powers_of_ten():
+    assert [percent(x) for x in (0.0123, 0.5, 1.234, 0.1)] == ["1.2 %", "50 %", "120 %", "10 %"]

@@ -10,6 +10,7 @@ import numpy as np
 from ..contact import resultants
 from ..contact.tooling import Tooling
 from ..findings import Finding, register
+from ..values.tolerances import ROUND_OFF
 from .mould_side import moulds
 
 
@@ -37,7 +38,9 @@ def untouched(path: Any) -> Iterator[Finding]:
         touched = any(_touches(problem, state, contacts) for state in _states_with_contact(path, active[1:], name))
         start, end = (_distances(problem, state, contacts) for state in (active[0], active[-1]))
         law, tool = contacts[0].contact, contacts[0].contact.name or contacts[0].contact.on
-        gaps = f"the gap was {start.min() + 0.0:.4g} at first and {end.min() + 0.0:.4g} at the end"      # not "-0"
+        near = ROUND_OFF * contacts[0].thickness
+        first, last = (0.0 if abs(gap) < near else gap for gap in (start.min(), end.min()))
+        gaps = f"the gap was {first:.4g} at first and {last:.4g} at the end"
         if law.direction is None and any(entry.contact in mould_contacts for entry in contacts) and \
                 end.mean() > start.mean() + contacts[0].thickness:
             yield Finding("warning", tool, f"the body moved away from this mould: the mean distance of its face"
@@ -45,7 +48,8 @@ def untouched(path: Any) -> Iterator[Finding]:
                           f" other face, and has it the right sign?")
         elif not touched and law.direction is not None:
             column = problem.scene.column(law) if law in problem.scene.drivable else ""
-            travel = f" of {active[-1].measures[column]:.4g}" if column in active[-1].measures else ""
+            travels = [state.measures[column] for state in active if column in state.measures]
+            travel = f" of {max(travels, key=abs):.4g}" if travels else ""
             yield Finding("warning", tool, f"this tool met nothing on its travel{travel}: {gaps}. A travel above 0 is"
                           f" along direction = ({', '.join(f'{m:g}' for m in law.direction)}); place the tool nearer,"
                           f" or turn its direction")
