@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from mpi4py import MPI
 
-from ..findings import Finding, register
+from ..findings import Finding, percent, register
 from ..physics.models import DisplacementPenalty
 from ..physics.supports import PrescribedDisplacement, Symmetry
 from ..scene.scene import Scene
@@ -144,7 +144,7 @@ def _contact_penalties(body: Body) -> Iterator[Finding]:
         if depth > MEASURED_ACCURACY:
             cause = "the target pressure" if presses else "a pressure of shear modulus times thickness over length"
             yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g} lets {cause},"
-                          f" {body.format(traction, 'stress', 3)}, press the face {100 * depth:.2g} % of the thickness"
+                          f" {body.format(traction, 'stress', 3)}, press the face {percent(depth)} of the thickness"
                           f" into the tool: use {traction / (0.001 * stress):.1g} or more")
         if contact.penalty > 1e9:
             yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: so stiff that round-off"

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...contact.tooling import Tooling
 from ...figures import figure, tools
-from ...findings import without_notes
+from ...findings import percent, without_notes
 from ...results import files
 from ...results.show import page, plots
 from ...units import Units
@@ -47,7 +47,7 @@ def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units)
     notes += [("", f"At bounds: {', '.join(met)}.")] * bool(met)
     notes += [("", f"Without effect on the wall: {', '.join(absent)}.")] * bool(absent)
     summary = [f"Why it ended: {result.reason}.",
-           f"The run before the best predicted its wall to {100 * deviation:.2g} %.",
+           f"The run before the best predicted its wall to {percent(deviation)}.",
            f"By the derivatives of the best run, these parameters could bring the unevenness to {attainable:.3g},"
            f" whatever the volume; it is {b:.3g}."]
     rows = [[str(k), *(page.number(v) for v in (run.wall[result.inside].std() / run.wall[result.inside].mean(),

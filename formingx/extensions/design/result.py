@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...findings import without_notes
+from ...findings import percent, without_notes
 from ...units import NONE, Units
 from ...values.tolerances import NEGLIGIBLE
 from .confidence import Confidence, confidence
@@ -146,7 +146,7 @@ class DesignResult:
             lines.insert(2, f"{'deviation, rms, %':24}{a:12.4g}{b:12.4g}")
         p = self.best.parameters
         lines += [f"{name:24}{x:12.5g}{y:12.5g}" for name, x, y in zip(p.names, self.before.vector, self.best.vector)]
-        lines += [f"the run before predicted the wall to {100 * deviation:.2g} %"]
+        lines += [f"the run before predicted the wall to {percent(deviation)}"]
         lines += [f"bounds: {', '.join(met)}" for met in [self.at_bounds()] if met]
         lines += [f"no effect: {', '.join(absent)}" for absent in [self.without_effect()] if absent]
         lines += [f"the best run: {found.text}" for found in without_notes(self.best.path.findings())]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...contact import resultants
-from ...findings import Finding
+from ...findings import Finding, percent
 from ...forms.outline import Outline, edge_points
 from ...ranks import gathered
 from ...scene.tool_width import CUT
@@ -154,7 +154,7 @@ class AdmissibilityCheck:
                        f" elements are too large for the tool")
             for deep in self._excess_penetration(edges, lengths, state):
                 yield (f"the body did not follow the tool of {deep.name!r}: contact points are {deep.depth:.4g} deep in"
-                       f" it, {100 * deep.ratio * _LIMITS.penetration:.2g} % of the remaining wall: give Contact a"
+                       f" it, {percent(deep.ratio * _LIMITS.penetration)} of the remaining wall: give Contact a"
                        f" penalty of {50 * deep.ratio * deep.contact.contact.penalty:.1g}")
             for contact in problem.active_contacts:
                 error = _force_error(contact, state, self._images)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...findings import Finding
+from ...findings import Finding, percent
 from ...ranks import gathered
 from ...values.tolerances import WALL_ERROR
 
@@ -91,8 +91,8 @@ def findings(item: Resticking | None) -> list[Finding]:
     """
     if item is None or item.shift < WALL_ERROR:
         return []
-    depend = f"depend on the steps, by up to {100 * item.shift:.2g} %" if item.shift < _LARGE_SHIFT else (
-        f"may depend on the steps (that point moved by {100 * item.shift:.2g} % of its tributary length)")
+    depend = f"depend on the steps, by up to {percent(item.shift)}" if item.shift < _LARGE_SHIFT else (
+        f"may depend on the steps (that point moved by {percent(item.shift)} of its tributary length)")
     count = f"{item.points} points that stuck" if item.points > 1 else "A point that stuck"
     return [Finding("warning", item.tool, f"{count} to {item.tool!r} lifted off and stuck again elsewhere, most near"
                     f" R = {item.point[0]:.5g}: walls near there {depend}. Compare"
