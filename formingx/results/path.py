@@ -356,7 +356,8 @@ class Path(States):
         energy added by remeshing. "heat": energy added by changes of temperature.
 
         Stored: "strain_energy" minus its first value. Lost: "dissipated_energy" and "damage_energy" of materials,
-        "friction", "jumps" (in snap-through), and "bonds" to adhesive tools.
+        "friction", "jumps" (in snap-through), and "bonds" to adhesive tools. Entries that a run cannot have are left
+        out: without friction `path.work().get("friction", 0.0)` is 0.
 
         "unbalanced": the rest, an error of the integrals and of the run. Above 0.5 % of the largest entry a warning is
         logged and added to the `findings`.
