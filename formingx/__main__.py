@@ -65,7 +65,8 @@ def _parser() -> argparse.ArgumentParser:
     comparison.add_argument("theirs", metavar="THEIRS",
                             help="CSV file of the other program, rows in order along its path")
     comparison.add_argument("--columns", nargs="+", metavar="OURS=THEIRS", default=[],
-                            help="columns that belong together, at least two (a bare NAME: the same on both sides)")
+                            help="columns that belong together, at least two (a bare NAME: the same on both sides);"
+                                 " default: the first two that both have, of two walls the first and the wall")
     comparison.add_argument("--units", nargs="+", metavar="OURS=UNIT", default=[],
                             help="of a column of ours: a factor for theirs, or our unit, if their header states theirs")
     comparison.add_argument("--out", type=Path, default=Path("results") / "compare",

@@ -66,6 +66,14 @@ def test_walls_are_compared_at_the_same_radius(factor):
     assert slid.differences["wall"].rms < 0.6 * d.rms
 
 
+def test_tables_of_the_wall_are_compared_by_their_walls(tmp_path):
+    """Between the radius and the wall a table of `Path.wall` has other columns."""
+    path = fx.trace(treloar(), until=fx.pole_height(1.0), progress=False)
+    path.wall().to_csv(tmp_path / "ours.csv")
+    found = fx.compare(tmp_path / "ours.csv", tmp_path / "ours.csv")
+    assert found.columns == ["reference_radius", "wall"] and found.differences["wall"].maximum < 1e-12
+
+
 def test_curves_that_turn_back_are_paired_by_arc_length():
     t = np.linspace(0, 6, 60)
     assert fx.compare(spiral(t), spiral(t)).along == ""

@@ -162,7 +162,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
         theirs: a `Path`, a CSV file, or {column: values}. The header of a CSV file names the columns and may state
             units, as "pressure [psi]".
         columns: {our name: their name}, or a list of names on both sides; at least two. Default: the first two of our
-            columns that theirs also has.
+            columns that theirs also has; if one of these has the name "wall", it takes the second place.
         units: {our name: factor} from their units to ours, or {our name: our unit} if their header states their unit.
             Known units are "m", "cm", "mm", "in", "Pa", "MPa", "bar", "psi", "kg/cm2", "cm3" and more.
         along: our name of the independent variable, or "arc length"; default as above.
@@ -239,11 +239,12 @@ def _columns(left: csv_files.CsvTable, right: csv_files.CsvTable, given: Any) ->
     Args:
         left: our table.
         right: their table.
-        given: argument `columns` of `compare`; None for the first two columns of equal name.
+        given: argument `columns` of `compare`; None for the first two columns of equal name, of tables of the
+            wall the first one and "wall".
     """
     if given is None:
         shared = [c for c in left.columns if c in right.columns and c != "iterations"]
-        pairs = {c: c for c in shared[:2]}
+        pairs = {c: c for c in ([shared[0], "wall"] if "wall" in shared[1:] else shared[:2])}
         if len(pairs) < 2:
             raise InputError(f"compare: columns: ours are {', '.join(left.columns)}; theirs are"
                              f" {', '.join(right.columns)}: fewer than two have the same name; say which belong"
