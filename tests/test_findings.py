@@ -169,5 +169,21 @@ def test_findings_of_a_scene_belong_to_its_path():
     assert [f.about for f in path.findings()] == ["materials['sheet']", "mould"]
 
 
+def test_stages_whose_tools_overlap_are_refused_by_check():
+    """The process refuses them, too."""
+    scene = sheet(contacts=[ball(), fx.Contact("bottom", fx.tools.plane(-3.0).reversed(), "none")])
+    for travel, found in ((2.0, 0), (8.0, 1)):
+        stages = [fx.Stage("plug", control="plug", until=fx.travel(travel))]
+        serious = [f for f in fx.check(scene, stages=stages).findings if f.severity == "serious"]
+        assert len(serious) == found and all("Stage 'plug': tools overlap" in f.text for f in serious)
+    with pytest.raises(fx.InputError, match="tools overlap"):
+        fx.Process(scene).run(stages, progress=False)
+    scene = fx.Scene(mesh=scene.mesh, materials=fx.NeoHookean(c10=0.4), contacts=scene.contacts,
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    assert "travel = 8: tools overlap" in str(fx.check(scene, targets=[fx.travel(8.0)]))
+    with pytest.raises(fx.InputError, match="travel = 8: tools overlap"):
+        fx.trace(scene, until=fx.travel(8.0), progress=False)
+
+
 def test_shares_are_written_without_powers_of_ten():
     assert [percent(x) for x in (0.0123, 0.5, 1.234, 0.1)] == ["1.2 %", "50 %", "120 %", "10 %"]

@@ -2,13 +2,14 @@
 
 from collections.abc import Sequence
 
-from ..errors import as_list, check_type
+from ..errors import InputError, as_list, check_type
 from ..findings import Finding, findings_at, without_notes, worst_first
 from ..measures.targets import Target
 from ..results.path import Path
+from ..scene import clearance
 from ..scene.scene import Scene
 from ..solve.branches import ANOTHER_PATH
-from ..solve.stage import Stage
+from ..solve.stage import Stage, plan
 from ..units import NONE, Units
 from . import end_of_run, parallel, promised_walls, ranges, scenes, tool_contact
 from .sizes import Body
@@ -55,14 +56,15 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
     * Tools that move away from the body, and open moulds.
     * A modulus that rises on cooling.
 
-    A "serious" finding is a target that `trace` refuses. Faults that make every run impossible raise an `InputError` in
-    `Scene` already. Examples are a body that is free to move, overlapping elements, and locking.
+    A "serious" finding is a target that `trace` refuses, or a stage that `Process` refuses. Faults that make every run
+    impossible raise an `InputError` in `Scene` already. Examples are a body that is free to move, overlapping elements,
+    and locking.
 
     Args:
         scene: the scene, or the `Path` of a finished run. The findings of the run at its end, and its branch points,
             are then added.
         targets: targets of the run. The check also covers whether the body can reach them.
-        stages: stages of the process. The check also covers their targets and tables.
+        stages: stages of the process. The check also covers their targets and tables, and whether tools overlap.
         units: units of the script, for the numbers in the findings; default none.
 
     Returns:
@@ -88,7 +90,18 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
     for stage in stages:
         check_type("check: stages: stage", stage, Stage, "a formingx.Stage")
     body = Body(scene, targets, stages, units)
-    return Report([*findings_at("scene", body), *findings_at("start", body)])
+    return Report([*findings_at("scene", body), *findings_at("start", body), *_overlaps(scene, targets, stages)])
+
+
+def _overlaps(scene: Scene, targets: Sequence[Target], stages: Sequence[Stage]) -> list[Finding]:
+    """Return a serious finding in a list if two tools overlap on the way to a target or in a stage; else []."""
+    try:
+        for target in targets:
+            clearance.check_target(scene, target)
+        clearance.check(scene, [plan(scene, stage) for stage in stages])
+    except InputError as error:
+        return [Finding("serious", "tools", str(error))]
+    return []
 
 
 def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[Stage] = ()) -> list[Finding]:

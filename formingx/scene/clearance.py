@@ -49,6 +49,25 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
     return unknown
 
 
+def check_target(scene: Scene, target: Any) -> None:
+    """Check that the tool that `trace` drives does not overlap another tool on its way to a target.
+
+    Args:
+        scene: the `Scene`.
+        target: the target, with `name` and `value`; only a travel is checked.
+
+    Raises:
+        InputError: two tools overlap.
+    """
+    if target.name != "travel" or not isinstance(scene.driven, Contact):
+        return
+    tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
+    outlines = {i: _outline(tool) for i, tool in tools.items()}
+    for travel in target.value * np.linspace(0, 1, PIECE_POINTS):
+        travels = {i: travel if tool.driven else 0.0 for i, tool in tools.items()}
+        _check_overlap(scene, str(target), tools, outlines, travels)
+
+
 def _break_points(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, float]]:
     """Yield the travels of all tools, {number in `Scene.items`: length}, at the break points of a stage.
 
