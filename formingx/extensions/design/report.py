@@ -144,8 +144,9 @@ def _sections(runs: list[Any], names: list[str], units: Units) -> str:
     shapes = [run.profile for run in runs]
     low, high = plots.span(shapes)
     colours = Normalize(min(s.wall_thickness.min() for s in shapes), max(s.wall_thickness.max() for s in shapes))
-    wide = float(np.clip(5 * (high - low)[0] / (high - low)[1], 3.0, 9.0))
-    drawing, axes = figure(len(runs), width=wide, height=max(5 * wide / 9, 3.2) if wide == 9 else 5.4)
+    aspect = (high - low)[0] / (high - low)[1]
+    wide = float(np.clip(5 * aspect, 3.0, 9.0 if len(runs) == 1 else 5.5))
+    drawing, axes = figure(len(runs), width=wide, height=float(np.clip(wide / aspect + 0.7, 2.4, 5.4)))
     for panel, run, shape, name in zip(np.atleast_1d(axes), runs, shapes, names):
         tooling, last = Tooling.of_problem(run.path.problem), run.path.last
         tools(panel, tooling.placed(tooling.travels(last.setting, last.control)), low, high)
