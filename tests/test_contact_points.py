@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from conftest import run_script
 from test_contact import cup
-from test_cooling import pressed
 from test_derivatives import difference, random_state, residual
 
 import formingx as fx
@@ -135,25 +134,13 @@ def test_ranks_agree_and_continue_runs_of_other_ranks(tmp_path):
         np.testing.assert_allclose(numbers(path), expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
 
 
-@pytest.mark.parametrize("make, words", [(plugged, "a contact point of the scene is not in it"),
-                                         (pressed, "the temperature history belongs to another mesh")])
-def test_saved_histories_belong_to_their_points(make, words):
-    """A contact face, or a body and its conducting tool: rows in another order are found, moved points are refused."""
-    history = Problem(make()).histories[0 if make is plugged else -1]
-
-    def saved():
-        data = history.save(history.get())
-        return data, [data, *data.get("tools", [])], "penalty" if make is plugged else "temperature"
-
-    data, parts, name = saved()
-    for part, key in zip(parts, (name, "excess")):
-        part[key] = np.arange(np.size(part[key]), dtype=float).reshape(np.shape(part[key]))
-        part["points"], part[key] = (np.array(part[k])[::-1] for k in ("points", key))
-    loaded = history.load(data)
-    for part, key, values in zip(parts, (name, "excess"), (getattr(loaded, name), *getattr(loaded, "tool_excess", []))):
-        assert np.array_equal(values, part[key][::-1]) and values.size > 10
-    for number in range(len(parts)):
-        data, parts, _ = saved()
-        parts[number]["points"] = np.array(parts[number]["points"]) + 1e-6
-        with pytest.raises(fx.InputError, match=words):
-            history.load(data)
+def test_saved_histories_belong_to_their_points():
+    """Rows in another order are found, and moved points are refused."""
+    history = Problem(plugged()).histories[0]
+    data = history.save(history.get())
+    data["penalty"] = np.arange(float(len(data["points"])))[::-1]
+    data["points"] = np.array(data["points"])[::-1]
+    assert np.array_equal(history.load(data).penalty, data["penalty"][::-1])
+    data["points"] = data["points"] + 1e-6
+    with pytest.raises(fx.InputError, match="a contact point of the scene is not in it"):
+        history.load(data)

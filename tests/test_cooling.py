@@ -9,6 +9,7 @@ from conftest import run_json
 from test_restart import same
 
 import formingx as fx
+from formingx.problem.problem import Problem
 
 POLYMER = fx.ThermalProperties(conductivity=0.17, density=2.0, heat_capacity=3.0)
 RELAXING = fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 0.5), (0.4, 3.0)])
@@ -141,6 +142,22 @@ def test_a_restarted_run_equals_an_uninterrupted_one(tmp_path):
         again = press(scene, start=start)
         same(again, whole, rel=1e-9)
         assert told(again) == pytest.approx(told(whole), rel=1e-9)
+
+
+def test_saved_temperatures_belong_to_their_points():
+    """Of the body and of a conducting tool: rows in another order are found, and moved points are refused."""
+    history = Problem(pressed()).histories[-1]
+    data = history.save(history.get())
+    for part, key in ((data, "temperature"), (data["tools"][0], "excess")):
+        part[key] = np.arange(float(np.size(part[key]))).reshape(np.shape(part[key]))[::-1]
+        part["points"] = np.array(part["points"])[::-1]
+    loaded = history.load(data)
+    assert np.array_equal(loaded.temperature, data["temperature"][::-1])
+    assert np.array_equal(loaded.tool_excess[0], data["tools"][0]["excess"][::-1])
+    for part in (data["tools"][0], data):
+        part["points"] = part["points"] + 1e-6
+        with pytest.raises(fx.InputError, match="the temperature history belongs to another mesh"):
+            history.load(data)
 
 
 RANKS = """
