@@ -15,7 +15,7 @@ import numpy as np
 
 from .fillets import FilletInSheet, FlatsInSheet, fillets_in_sheet, flats_in_sheet
 from .mesh import Mesh, Preset
-from .sizes import GROWTH, ends_of_columns, length_along, moved_nodes
+from .sizes import GROWTH, ends_of_columns, length_along, moved_nodes, number_of_columns
 
 
 class Fineness(NamedTuple):
@@ -23,23 +23,23 @@ class Fineness(NamedTuple):
 
     Attributes:
         along: number of columns along a sheet without fillets and constrained ends.
-        fillet: length of a deformed column on a fillet over the geometric mean of fillet radius and wall thickness.
-        through: smallest number of elements through the sheet.
+        end: largest number of elements through the sheet for which columns at a constrained end become shorter.
+        most: largest number of elements through the sheet.
         even: distance from a constrained end up to which the columns have their shortest length, over the thickness.
         height: largest height over length of an element on a fillet, both in the reference configuration.
         promised: largest relative error of the wall.
     """
 
     along: int
-    fillet: float
-    through: int
+    end: int
+    most: int
     even: float
     height: float
     promised: float
 
 
-FINENESS = {"draft": Fineness(16, 1.15, 1, 0.0, 5.0, 0.03), "standard": Fineness(20, 0.68, 2, 0.0, 4.0, 0.01),
-            "fine": Fineness(40, 0.36, 3, 1.0, 4.0, 0.003)}
+FINENESS = {"draft": Fineness(16, 1, 6, 0.0, 4.0, 0.03), "standard": Fineness(20, 2, 8, 0.0, 5.0, 0.01),
+            "fine": Fineness(32, 3, 12, 1.0, 5.0, 0.003)}
 """Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
 
 _THICKEST = 1 / 10
@@ -48,41 +48,37 @@ _THICKEST = 1 / 10
 _BLOCK = 1 / 4
 """Thickness over length above which a body is called a block, whose wall is of no interest."""
 
-_SHORTEST = 1 / 16
+_SHORTEST = 1 / 20
 """Smallest over largest length of a column."""
 
 _POSITION_ERROR = 0.03
 """Largest error of the estimated ends of a fillet in the sheet, over the length of the sheet. Towards the start of the
-sheet the error may be three times larger."""
+sheet the error may be twice as large, in a curved sheet three times."""
 
 _END_COLUMN_LENGTH = 0.5
-"""Length of a column at a constrained end over the height of an element there, of at most `Fineness.through` elements
+"""Length of a column at a constrained end over the height of an element there, of at most `Fineness.end` elements
 through the sheet. Shorter columns lock, longer ones miss the bending."""
 
-_WEAK_BENDING = 0.04
-"""Wall over fillet radius, times 1 - cos of the angle of the arc, below which two elements through the sheet are
-enough."""
+_ALONG_CONCAVE = 0.0155
+"""Relative error of the wall on a concave fillet if the deformed columns are as long as its radius and the sheet is not
+stretched (`_column_length`)."""
 
-_MAX_WALL = 0.25
-"""Largest wall over fillet radius that enters the geometric mean: a thicker wall allows no longer columns."""
+_ALONG_CONVEX = 0.52
+"""The same error on a fillet behind which the wall is e times as thick as in front of it."""
 
-_TURN = 1 / 8
-"""Exponent of 1 - cos of the angle of the arc: the sheet bridges a short arc less, and its columns may be longer."""
+_LEAST_STEP = 0.16
+"""Smallest change of the logarithm of the wall that is expected over a fillet."""
 
-_ON_FLAT = 2.0
-"""Length of a column on a flat face of a tool over that on a fillet whose radius is the radius of the free surface when
-the sheet touches. A thin sheet leaves the face within this length; longer columns touch too late."""
+_ON_FLAT = 0.012
+"""The same error on a flat face of a tool if the columns are as long as the geometric mean of wall and radius of the
+free surface. A thin sheet leaves the face within this length; longer columns touch too late."""
 
-_ON_CONVEX = 0.25
-"""Relative error of the wall on a convex fillet, over which the sheet is drawn, over the square of wall / (fillet
-radius times elements through the sheet): 0.09 to 0.25 in five moulds."""
+_THROUGH = 0.0225
+"""Relative error of the wall on a fillet for one element through a sheet that is as thick as the radius and is not
+stretched (`_error_through`)."""
 
-_ON_CONCAVE = 0.14
-"""The same quotient on a concave fillet: 0.09 to 0.17 in five moulds."""
-
-_SHARPEST = 1.0
-"""Largest wall over fillet radius for which the elements through the sheet are chosen. At 1.5 "draft" has an error of
-4.7 %."""
+_THROUGH_CONVEX = 0.33
+"""The same error on a convex fillet behind which the wall is e times as thick as in front of it."""
 
 _BESIDE_END = 3.0
 """Distance of the middle of a lip, a convex fillet, from a constrained end, over the thickness, below which the sheet
@@ -113,53 +109,71 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     if not touching or thickness > _THICKEST * s[-1]:
         return mesh
     fineness = FINENESS[preset.accuracy]
-    longest = s[-1] / fineness.along
     constrained = [s[end] for end in (0, -1) if rows[:, end, 0].max() > 1e-9 * s[-1]]     # the axis is none
-    size = np.full(len(s), longest)
-    shortest, bending, through = longest, 0.0, 1
-    inaccurate = []
+    longest = s[-1] / fineness.along
+    size, fillets, inaccurate = np.full(len(s), longest), [], []
     for item in touching:
+        flat = bool(np.ptp(faces[item.on][:, 1]) < 1e-9 * s[-1])
         for fillet in fillets_in_sheet(item.tool, faces[item.on], axisymmetric, item.direction is not None):
-            wall = thickness * fillet.area_ratio
-            mean = np.sqrt(fillet.radius * min(wall, _MAX_WALL * fillet.radius))
-            column_length = fineness.fillet * fillet.stretch * mean
-            column_length *= max(fillet.turn, 0.25) ** -_TURN               # arcs of a curve may be short
-            column_length = max(column_length, _SHORTEST * longest)
             middle = (fillet.first + fillet.last) / 2
-            if fillet.concave or all(abs(middle - end) > _BESIDE_END * thickness for end in constrained):
-                bend = min(wall / fillet.radius, np.arccos(1 - fillet.turn))
-                through = max(through, _through_fillet(bend, fillet.concave, fineness.promised))
-                if bend > _SHARPEST:
-                    inaccurate.append(_sharp_fillet(item, fillet, wall, preset.accuracy, fineness))
-            shortest = min(shortest, column_length)
-            size = np.minimum(size, column_length + GROWTH * _distance(s, fillet))
-            if fillet.concave:
-                bending = max(bending, wall / fillet.radius * fillet.turn)
+            inside = fillet.concave or all(abs(middle - end) > _BESIDE_END * thickness for end in constrained)
+            fillets.append((fillet, inside, _distance(s, fillet, flat)))
+            if inside and _bend(fillet, thickness) > 1:
+                inaccurate.append(_sharp_fillet(item, fillet, thickness, preset.accuracy, fineness))
         if item.direction is None:
-            size = np.minimum(size, np.maximum(_on_flats(
-                flats_in_sheet(item.tool, faces[item.on], axisymmetric), s, thickness, fineness), _SHORTEST * longest))
-    through = max(through, fineness.through if bending >= _WEAK_BENDING else min(fineness.through, 2),
-                  int(np.ceil(thickness / (fineness.height * shortest) - 1e-9)))
-    for end in constrained:
-        distance = np.maximum(np.abs(s - end) - fineness.even * thickness, 0.0)
-        size = np.minimum(size, _END_COLUMN_LENGTH * thickness / min(through, fineness.through) + GROWTH * distance)
+            flats = flats_in_sheet(item.tool, faces[item.on], axisymmetric)
+            size = np.minimum(size, np.maximum(_on_flats(flats, s, thickness, fineness.promised), _SHORTEST * longest))
+    size, through = _fewest_unknowns(s, size, fillets, constrained, thickness, fineness)
     ends = ends_of_columns(coordinates, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
     return replace(preset.make(ends, _through_layers(preset, through, keep_through)), inaccurate=tuple(inaccurate))
 
 
-def _sharp_fillet(item: Any, fillet: FilletInSheet, wall: float, accuracy: str, fineness: Fineness) -> str:
+def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[FilletInSheet, bool, np.ndarray]],
+                     constrained: list[float], thickness: float, fineness: Fineness) -> tuple[np.ndarray, int]:
+    """Return the largest lengths of columns, shape (n,), and the number of elements through the sheet.
+
+    They are those with the fewest unknowns among all that keep the promised error on every fillet.
+
+    Args:
+        s: lengths along the sheet from its start to n points, shape (n,), length.
+        size: largest lengths of columns without fillets and constrained ends, shape (n,), length.
+        fillets: each fillet, False for a lip beside a constrained end, and the distances of the points, shape (n,).
+        constrained: lengths along the sheet from its start to its constrained ends.
+        thickness: thickness of the sheet, length.
+        fineness: sizes of the elements.
+    """
+    choices, longest = [], s[-1] / fineness.along
+    for through in range(1, fineness.most + 1):
+        errors, lengths, sizes = [0.0], [longest], [size]
+        for fillet, inside, distance in fillets:
+            errors.append(_error_through(fillet, thickness, through, inside) / fineness.promised)
+            length = _column_length(fillet, fineness.promised * np.sqrt(max(1 - errors[-1] ** 2, 0.0)))
+            lengths.append(max(length, _SHORTEST * longest))
+            sizes.append(lengths[-1] + GROWTH * distance)
+        for end in constrained:
+            distance = np.maximum(np.abs(s - end) - fineness.even * thickness, 0.0)
+            sizes.append(_END_COLUMN_LENGTH * thickness / min(through, fineness.end) + GROWTH * distance)
+        smallest = np.minimum.reduce(sizes)
+        fails = max(errors) > 1 or thickness > fineness.height * through * min(lengths)
+        unknowns = number_of_columns(s, smallest)[-1] * (18 * through + 4)
+        choices.append((fails, -through if fails else unknowns, smallest, through))
+    return min(choices, key=lambda choice: choice[:2])[2:]
+
+
+def _sharp_fillet(item: Any, fillet: FilletInSheet, thickness: float, accuracy: str, fineness: Fineness) -> str:
     """Return the text of the finding about a fillet that is sharper than the wall on it is thick.
 
     Args:
         item: the contact.
         fillet: the fillet.
-        wall: estimated wall on the fillet, length.
+        thickness: thickness of the sheet, length.
         accuracy: "draft", "standard" or "fine".
         fineness: sizes of the elements of this accuracy.
     """
-    return (f"on a fillet of {item.name or item.on!r} of radius {fillet.radius:.4g} the wall, about {wall:.3g}, is"
-            f" thicker than the radius: there its error may exceed the {fineness.promised:.1%} of accuracy ="
-            f" {accuracy!r}. Compare a run with accuracy = 'fine', or give more elements through the sheet")
+    return (f"on a fillet of {item.name or item.on!r} of radius {fillet.radius:.4g} the wall, about"
+            f" {thickness * fillet.area_ratio:.3g}, is thicker than the radius: there its error may exceed the"
+            f" {fineness.promised:.1%} of accuracy = {accuracy!r}. Compare a run with accuracy = 'fine', or give more"
+            f" elements through the sheet")
 
 
 def is_thick_sheet(mesh: Mesh) -> bool:
@@ -175,43 +189,93 @@ def is_thick_sheet(mesh: Mesh) -> bool:
     return _THICKEST < float(mesh.preset.thickness.sum()) / length_along(line)[-1] < _BLOCK
 
 
-def _distance(s: np.ndarray, fillet: FilletInSheet) -> np.ndarray:
+def _distance(s: np.ndarray, fillet: FilletInSheet, flat: bool) -> np.ndarray:
     """Return the distance along the sheet from points to the part that may lie on a fillet, shape (n,), length.
 
     It is 0 within this part.
 
-    s: lengths along the sheet from its start to the points, shape (n,).
+    Args:
+        s: lengths along the sheet from its start to the points, shape (n,), length.
+        fillet: the fillet.
+        flat: True for a sheet that is flat in the reference configuration.
     """
     error = _POSITION_ERROR * s[-1]
-    return np.maximum(np.maximum(fillet.first - 3 * error - s, s - fillet.last - error), 0.0)
+    return np.maximum(np.maximum(fillet.first - (2 if flat else 3) * error - s, s - fillet.last - error), 0.0)
 
 
-def _through_fillet(bend: float, concave: bool, promised: float) -> int:
-    """Return the number of elements through a sheet on a fillet.
+def _bend(fillet: FilletInSheet, thickness: float) -> float:
+    """Return the wall over the radius of a fillet, at most the angle of the arc: the wall bridges shorter arcs.
 
     Args:
-        bend: wall over fillet radius, at most the angle of the arc: the wall bridges shorter arcs.
-        concave: True if the sheet bridges the fillet before it touches it.
-        promised: largest relative error of the wall.
+        fillet: the fillet.
+        thickness: thickness of the sheet, length.
     """
-    factor = _ON_CONCAVE if concave else _ON_CONVEX
-    return int(np.ceil(min(bend, _SHARPEST) * np.sqrt(factor / promised) - 1e-9))
+    return float(min(thickness * fillet.area_ratio / fillet.radius, np.arccos(1 - fillet.turn)))
 
 
-def _on_flats(flats: FlatsInSheet, s: np.ndarray, thickness: float, fineness: Fineness) -> np.ndarray:
-    """Return the largest length of a column at points of a sheet that touch flat faces, shape (n,), length.
+def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside: bool) -> float:
+    r"""Return the relative error of the wall on a fillet that is due to the number of elements through the sheet.
+
+    With the thickness h0, radius r of the fillet, inverse stretch q, n elements and change s of the logarithm of the
+    wall over the fillet it is the larger of
+
+    .. math:: b_1 \frac{h_0}{q r n^{7/4}}, \quad b_2 s \Bigl(\frac{h_0}{r}\Bigr)^{3/2} \frac{1}{n^2}.
+
+    The second error is that of a convex fillet over which the sheet is drawn. A wall thicker than the radius counts as
+    one as thick as the radius: such an edge is reported.
+
+    Args:
+        fillet: the fillet.
+        thickness: thickness of the sheet, length.
+        through: number of elements through the sheet.
+        inside: False for a lip beside a constrained end.
+    """
+    relative = min(_bend(fillet, thickness), 1.0) / max(fillet.area_ratio, 1e-6)
+    error = _THROUGH * relative / fillet.stretch / through**1.75
+    if inside and not fillet.concave:
+        error = max(error, _THROUGH_CONVEX * fillet.step * relative**1.5 / through**2)
+    return float(error)
+
+
+def _column_length(fillet: FilletInSheet, error: float) -> float:
+    r"""Return the length of a column in the reference configuration that has a given error of the wall on a fillet.
+
+    A column of the deformed length l has the larger of the errors
+
+    .. math:: a_1 \Bigl(\frac{l}{q^{3/2} r}\Bigr)^{7/4}, \quad a_2 s \Bigl(\frac{l}{r}\Bigr)^2
+
+    on a concave fillet, and the second one on a convex fillet (symbols as in `_error_through`).
+
+    Args:
+        fillet: the fillet.
+        error: relative error of the wall.
+    """
+    step = max(fillet.step, _LEAST_STEP)
+    relative = np.sqrt(error / (_ALONG_CONVEX * step))
+    if fillet.concave:
+        relative = min(relative, fillet.stretch**1.5 * (error / _ALONG_CONCAVE) ** (1 / 1.75))
+    return float(fillet.stretch * fillet.radius * relative)
+
+
+def _on_flats(flats: FlatsInSheet, s: np.ndarray, thickness: float, error: float) -> np.ndarray:
+    r"""Return the largest length of a column at points of a sheet that touch flat faces, shape (n,), length.
+
+    A column of the deformed length l, of a wall h, has the error
+
+    .. math:: a_3 \Bigl(\frac{l}{\sqrt{\rho h}}\Bigr)^{3/2}
+
+    with the radius rho of the free surface when the sheet touches.
 
     Args:
         flats: points of the sheet that touch.
-        s: lengths along the sheet from its start to the points, shape (n,).
+        s: lengths along the sheet from its start to the points, shape (n,), length.
         thickness: thickness of the sheet, length.
-        fineness: sizes of the elements.
+        error: relative error of the wall.
     """
     if not len(flats.positions):
         return np.full(len(s), np.inf)
-    wall = np.minimum(thickness * flats.area_ratios, _MAX_WALL * flats.free_radii)
-    length = _ON_FLAT * fineness.fillet * flats.stretches * np.sqrt(flats.free_radii * wall)
-    return np.interp(s, flats.positions, length)
+    length = flats.stretches * np.sqrt(flats.free_radii * thickness * flats.area_ratios)
+    return np.interp(s, flats.positions, length * (error / _ON_FLAT) ** (2 / 3))
 
 
 def _through_layers(preset: Preset, through: int, keep: bool) -> list[int]:

@@ -28,6 +28,7 @@ class FilletInSheet(NamedTuple):
         stretch: inverse stretch of the sheet on the fillet along the section, reference over deformed length.
         area_ratio: reference over deformed area there, which equals deformed over reference thickness.
         concave: True if the sheet bridges the fillet before it touches it.
+        step: absolute change of the logarithm of the wall over the fillet.
     """
 
     first: float
@@ -37,6 +38,7 @@ class FilletInSheet(NamedTuple):
     stretch: float
     area_ratio: float
     concave: bool
+    step: float
 
 
 class FlatsInSheet(NamedTuple):
@@ -82,8 +84,20 @@ class _Touched(NamedTuple):
         along = length_along(self.points)
         before, after = max(group[0] - 1, 0), min(group[-1] + 1, len(along) - 1)
         stretch = (self.positions[after] - self.positions[before]) / max(along[after] - along[before], 1e-300)
+        stretch = max(stretch, 0.01)                            # also where the estimate puts points on one another
         mean = self.reference_radii[group].mean(), self.points[group, 0].mean()
         return stretch, stretch * (mean[0] / max(mean[1], 1e-300) if axisymmetric else 1.0)
+
+    def step(self, axisymmetric: bool, group: np.ndarray) -> float:
+        """Return the absolute change of the logarithm of the wall over a group of points.
+
+        Args:
+            axisymmetric: True for bodies of revolution, False in plane strain.
+            group: numbers of the points, consecutive.
+        """
+        sides = np.clip([group[0] - 2, group[-1] + 2], 0, len(self.points) - 1)      # their neighbours are outside, too
+        before, after = (max(self.stretches(axisymmetric, side)[1], 1e-9) for side in sides[:, None])
+        return float(abs(np.log(after / before)))
 
 
 _PIECE = 1 / 60
@@ -116,7 +130,7 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
             r = x[group, 0].max()
             first, last = np.interp([_MIN_RADIUS_RATIO * r, r], face[:, 0], s)
             stretch = (1 + _MIN_RADIUS_RATIO) / 2
-            yield FilletInSheet(first, last, 1 / curvature[group[0]], 1.0, stretch, stretch, False)
+            yield FilletInSheet(first, last, 1 / curvature[group[0]], 1.0, stretch, stretch, False, 1 - stretch)
         return
     found = _touched(tool, face)
     along = length_along(found.points)
@@ -126,8 +140,9 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
         angle = min((along[after] - along[before]) / radius, np.pi / 2)
         first, last = found.positions[group[[0, -1]]]
         stretch, area_ratio = found.stretches(axisymmetric, group)
-        yield FilletInSheet(first, last, radius, 1 - np.cos(angle), stretch, area_ratio,
-                            bool(found.free_radii[group[len(group) // 2]] < 1.5 * radius))
+        concave = bool(found.free_radii[group[len(group) // 2]] < 1.5 * radius)
+        yield FilletInSheet(first, last, radius, 1 - np.cos(angle), stretch, area_ratio, concave,
+                            found.step(axisymmetric, group))
 
 
 def flats_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool) -> FlatsInSheet:
