@@ -230,3 +230,23 @@ def test_a_warning_names_the_end_of_a_contact(caplog):
                           r" ends: use shorter elements along the face", caplog.text)
         errors.append(float(found.group(1)))
     assert errors[1] > 0.8 * errors[0] and errors[2] < 0.7 * errors[0], errors
+
+
+@pytest.mark.parametrize("change, message", [
+    ({}, None), ({"conductance": 500.0}, "conductance 500 is 2.5e.06 times conductivity over thickness"),
+    ({"density": 1.05e-9}, "the diffusivity, .* is 1.06e.05, and the body 20 long"),
+    ({"hot": 423.0}, "up to 423 hot.*degrees Celsius, 'C', or kelvin"), ({"unit": "K"}, "down to 30 cold.*unit='K'"),
+    ({"hot": 423.0, "tool": 303.0, "unit": "K"}, None), ({"duration": None}, "takes no time, so that no heat")],
+    ids=lambda value: ", ".join(value) if isinstance(value, dict) else "")
+def test_mixed_units_of_heat_are_reported(change, message):
+    """In W, mm, s and degrees Celsius."""
+    given = {"conductance": 5e-4, "density": 1.05e-3, "hot": 150.0, "tool": 30.0, "unit": "C", "duration": 0.3} | change
+    polymer = fx.ThermalProperties(conductivity=0.2e-3, density=given["density"], heat_capacity=1.8)
+    heat = fx.Cooling(polymer, unit=given["unit"], tools={"mould": (given["conductance"], given["tool"])})
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=20.0, thickness=1.0, elements=(8, [1, 2, 2, 1])), heat=heat,
+                     temperature=given["hot"], materials=fx.NeoHookean(c10=0.2),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")],
+                     contacts=[fx.Contact("top", fx.tools.plane(4.0), "none", name="mould")])
+    stage = fx.Stage("blow", control="air", until=fx.pressure(0.02), duration=given["duration"])
+    report = fx.check(scene, stages=[stage])
+    assert re.search(message, str(report)) if message else report.healthy, str(report)

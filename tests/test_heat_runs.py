@@ -163,3 +163,17 @@ def test_too_many_time_steps_are_reported():
     with pytest.raises(fx.ConvergenceError, match="max_steps = 5") as error:
         sides(max_steps=5)
     assert len(error.value.path.times) == 6
+
+
+def test_mixed_units_of_a_run_are_reported(caplog):
+    """A sheet in mm with constants in SI; one with the Stefan-Boltzmann constant in SI."""
+    sheet = fx.mesh.disc(radius=50.0, thickness=2.0, elements=(4, 2))
+    laws = {"start": 25.0, "times": 1.0, "unit": "C", "tolerance": 1.0}
+    si = fx.ThermalProperties(conductivity=0.2, density=1050.0, heat_capacity=1800.0)
+    fx.heat(sheet, si, [fx.Convection("top", h=10.0, air=100.0)], **laws)
+    assert "the diffusivity, conductivity / (density heat_capacity), is 1.06e-07, and the body 50 long" in caplog.text
+    caplog.clear()
+    mm = fx.ThermalProperties(conductivity=0.2e-3, density=1.05e-3, heat_capacity=1.8)
+    with pytest.raises(fx.ConvergenceError, match="are all laws in one system of units"):
+        fx.heat(sheet, mm, [fx.Radiation("top", emissivity=0.9, heater=450.0)], **laws)
+    assert not caplog.text

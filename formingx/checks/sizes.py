@@ -67,6 +67,7 @@ class Body(Triangles):
         prescribed: list of `PrescribedValue`: target pressures and travels, and the value of largest magnitude of each
             table of a load, support or tool.
         has_targets: True if there are targets or stages.
+        stages: stages of the process, as given.
         targets: all targets of the run and of its stages.
         table_maxima: for each stage in which an output quantity follows a table, the largest value of the table as a
             `Target` (`Stage.highest`).
@@ -79,7 +80,7 @@ class Body(Triangles):
         self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
         self.pressure_scale = max(self.moduli.values()) * self.thickness / self.length
         self.prescribed = [entry for target in targets for entry in self._prescribed_values(target, scene.driven)]
-        self.has_targets = bool(targets or stages)
+        self.has_targets, self.stages = bool(targets or stages), stages
         self.targets = [*targets, *(t for stage in stages for t in (*stage.intermediate, stage.until) if t)]
         self.table_maxima = [stage.highest for stage in stages if stage.highest]
         for stage in stages:

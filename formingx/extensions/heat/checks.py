@@ -9,11 +9,11 @@ from ...errors import InputError
 from ...findings import Finding, register
 from ...materials.constants import OfTemperature
 from ...materials.solidification import Solidification
-from ...values.temperature import FunctionOfTemperature
+from ...values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 from ...values.tolerances import MEASURED_ACCURACY
 from .cooling_history import CoolingHistory
 from .layers import graded, height_at
-from .run import checked_materials
+from .run import checked_materials, implausible_diffusivities
 
 _FROZEN = (", where the material does not relax any more: give Solidification or a modulus that rises, if it turns into"
            " glass")
@@ -141,6 +141,56 @@ def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
                               f" degrees as at {high:.4g}: as the stretched part cools, it pulls back with that much"
                               f" more force, instead of solidifying in its shape. For a material that solidifies see"
                               f" fx.Solidification and docs/heat.md")
+
+
+@register("start")
+def implausible_units(body: Any) -> Iterator[Finding]:
+    """Find temperatures, conductances and diffusivities that no polymer process has, as in mixed units; collective.
+
+    A body has from 200 to 680 K, and its surroundings at least 200 K. The Biot number is at most 1e4: a contact of 1e6
+    W/(m2 K) with 2 mm of a polymer. For the diffusivity see `implausible_diffusivities`.
+
+    Args:
+        body: the examined body, with its `scene` and its `thickness`.
+
+    Yields:
+        A warning for each implausible quantity.
+    """
+    scene = body.scene
+    if scene.heat is None:
+        return
+    zero = ABSOLUTE_ZERO[scene.heat.unit]
+    hottest = max(scene.mesh.comm.allgather(scene.temperature.T.x.array.max(initial=-np.inf)))
+    coldest, _ = scene.heat.extremes(scene)
+    if hottest - zero > 680 or np.isfinite(coldest) and coldest - zero < 200:
+        yield Finding("warning", "temperature", f"the body is up to {hottest:.4g} hot, body or surroundings down to"
+                      f" {coldest:.4g} cold, with Cooling(unit={scene.heat.unit!r}). Polymers are formed between 200"
+                      f" and 680 K: are these degrees Celsius, 'C', or kelvin, 'K'?")
+    materials = checked_materials(scene.mesh, scene.heat.materials).values()
+    conductivity = min(material.conductivity for material in materials)
+    for face, conductance in scene.heat.conductances(scene).items():
+        biot = conductance * body.thickness / conductivity
+        if 1e4 < biot < np.inf:
+            yield Finding("warning", f"boundary {face!r}", f"its conductance {conductance:g} is {biot:.2g} times"
+                          f" conductivity over thickness: are both in one system of units? 1000 W/(m2 K) is 1e-3 in W,"
+                          f" mm and K")
+    for text in implausible_diffusivities(materials, body.length):
+        yield Finding("warning", "heat", text)
+
+
+@register("start")
+def heat_without_time(body: Any) -> Iterator[Finding]:
+    """Report a run in which no stage takes time, so that no heat is conducted.
+
+    Args:
+        body: the examined body, with its `scene` and the `stages` of the process.
+
+    Yields:
+        A warning, if there is a `Cooling`.
+    """
+    if body.scene.heat is not None and body.has_targets and not any(stage.timed for stage in body.stages):
+        yield Finding("warning", "heat", "the run takes no time, so that no heat is conducted: give stages of a Process"
+                      " a speed, a duration or a table over time")
 
 
 @register("start")

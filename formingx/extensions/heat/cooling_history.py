@@ -166,8 +166,8 @@ class CoolingHistory:
             return []
         low, high = self._cooling.extremes(scene)
         most = max(span, high - low) if np.isfinite(high - low) else span          # no error is larger
-        error = f"is about {errors[worst]:.2g}" if errors[worst] < most else f"may be the whole span, {most:.3g}"
-        end = ends_of_contact[worst]
+        about, end = float(f"{errors[worst]:.2g}"), ends_of_contact[worst]
+        error = f"is about {about:g}" if errors[worst] < most else f"may be the whole span, {most:.3g}"
         advice = ("use shorter elements along the face there; thinner ones do not reduce this error" if end else
                   f"use thinner elements at faces that touch a tool or lose heat"
                   f"{_finer_elements(scene, min(errors[worst], most) / allowed, duration)}")

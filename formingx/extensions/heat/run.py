@@ -1,7 +1,7 @@
 """Heating and cooling over time: `heat`."""
 
 import logging
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,7 @@ from mpi4py import MPI
 from ... import _compat
 from ...errors import ConvergenceError, InputError, as_list, check_name, check_type, finite, positive
 from ...mesh import Mesh
-from ...mesh.nodes import dof_positions
+from ...mesh.nodes import dof_positions, span
 from ...physics.kinematics import Axisymmetric
 from ...scene import fields
 from ...values.temperature import ABSOLUTE_ZERO
@@ -77,6 +77,9 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
     if displacement is not None and getattr(displacement, "ufl_shape", None) != (2,):
         raise InputError(f"heat: displacement = {displacement!r}: must be a Function or expression (u_r, u_z)")
     tolerance = positive("heat: tolerance", tolerance)
+    length = float(np.ptp(span(mesh.domain, mesh.comm), axis=0).max())
+    for text in implausible_diffusivities(materials.values(), length):
+        _log.warning("heat: %s", text)
     moved = None if displacement is None else _Displacement(displacement, mesh)
     fine = layered(mesh, _depths(materials, boundaries, outputs), moved)
     make = partial(Conduction, fine, materials, boundaries, kinematics, ABSOLUTE_ZERO[unit],
@@ -214,6 +217,25 @@ def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
         _log.warning("heat: the error in space is about %.2g degrees at time %g, more than %.2g: use more elements"
                      " along the body, or through it where it is curved", run.errors_in_space[worst],
                      run.outputs[worst], allowed)
+
+
+def implausible_diffusivities(materials: Iterable[ThermalProperties], length: float) -> Iterator[str]:
+    """Yield a text for each diffusivity that no polymer has in a system of units that suits the length of the body.
+
+    Polymers have from 1e-8 to 1e-5 m2/s. Lengths may be in m, cm, mm, um or in, if the body is then from 0.1 mm to 20 m
+    long.
+
+    Args:
+        materials: thermal properties of the layers.
+        length: largest extent of the body, length.
+    """
+    metres = np.array([1.0, 1e-2, 1e-3, 1e-6, 0.0254])
+    metres = metres[(length * metres > 1e-4) & (length * metres < 20)]
+    for value in sorted({material.diffusivity for material in materials}):
+        if not np.any((value * metres**2 > 1e-8) & (value * metres**2 < 1e-5)):
+            yield (f"the diffusivity, conductivity / (density heat_capacity), is {value:.3g}, and the body {length:.3g}"
+                   f" long: polymers have about 1e-7 m2/s, 0.1 mm2/s. Are conductivity, density, heat capacity and"
+                   f" lengths in one system of units?")
 
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
