@@ -63,7 +63,7 @@ _ALONG_CONCAVE = 0.0155
 """Relative error of the wall on a concave fillet if the deformed columns are as long as its radius and the sheet is not
 stretched (`_column_length`)."""
 
-_ALONG_CONVEX = 0.52
+_ALONG_CONVEX = 0.65
 """The same error on a fillet behind which the wall is e times as thick as in front of it."""
 
 _LEAST_STEP = 0.16
@@ -77,7 +77,7 @@ _THROUGH = 0.0225
 """Relative error of the wall on a fillet for one element through a sheet that is as thick as the radius and is not
 stretched (`_error_through`)."""
 
-_THROUGH_CONVEX = 0.33
+_THROUGH_CONVEX = 0.35
 """The same error on a convex fillet behind which the wall is e times as thick as in front of it."""
 
 _BESIDE_END = 3.0
