@@ -616,6 +616,17 @@ def test_results_of_sections_are_refused_for_sheets_in_three_dimensions(tmp_path
     assert (tmp_path / f"tray-{len(path) - 1}.vtu").exists()
 
 
+def test_a_sheet_that_sticks_to_a_flange_is_not_in_compression():
+    """Its points move by their elastic slip only."""
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(140, 100, corner=8, part="quarter"), size=12)
+    mould = fx.tools.box(half=(60, 40), depth=18, corner=14, fillet=7, lip=3, draft=6)
+    scene = fx.Scene(mesh=sheet, thickness=0.8, materials=fx.NeoHookean(c10=0.05), loads=[fx.Pressure("top")],
+                     supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")],
+                     contacts=[fx.Contact("bottom", mould)])
+    path = fx.trace(scene, until=fx.pressure(0.05), progress=False)
+    assert path.wall().stretches.min() < 1 - 1e-7 and not path.wall().wrinkled.any() and not path.findings()
+
+
 @pytest.mark.parametrize("wrinkles", [None, 0.01])
 def test_report_warns_of_compression_without_relaxed_energy(tmp_path, monkeypatch, wrinkles):
     """The report warns of compression only without relaxed energy; without a screen it says that pictures lack."""

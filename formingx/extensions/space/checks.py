@@ -12,6 +12,7 @@ from ...scene.contact_checks import OTHER_UNIT
 from ...tools.pieces import Arc
 from ...values.tolerances import NEGLIGIBLE
 from .solid_tool import Swept
+from .surface import smaller_stress
 from .triangulated import Triangulated
 
 
@@ -32,9 +33,9 @@ def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
     wall = path.wall()
     share = float(wall.reference_area[wall.wrinkled].sum() / wall.reference_area.sum())
     if share >= NEGLIGIBLE:
-        place = ", ".join(f"{v:.4g}" for v in wall.middle[int(np.argmax(wall.wrinkled))])
+        place = ", ".join(f"{v:.4g}" for v in wall.middle[int(np.argmin(smaller_stress(wall.stretches)))])
         yield Finding("serious", "membrane", f"{100 * share:.3g} % of the sheet is in compression in the last state,"
-                      f" one place at (x, y, z) = ({place}): it wrinkles there, and its wall depends on the mesh: use"
+                      f" most at (x, y, z) = ({place}): it wrinkles there, and its wall depends on the mesh: use"
                       f" Membrane(wrinkles=0.01), and look at path.wall().wrinkled.")
 
 

@@ -34,6 +34,7 @@ from ...forms.formulation import Formulation
 from ...forms.membrane import FIRST_STRETCH
 from ...forms.probes import Probe
 from ...physics.loads import Pressure
+from ...values.tolerances import NEGLIGIBLE
 from .pressure_on_tools import PressureOnTools
 
 _REGULARISING_STIFFNESS = 1e-7
@@ -211,13 +212,32 @@ def relaxed(F: Any) -> Any:
                           [0, 0, select(F[2, 2], l2)]])
 
 
-def wrinkled(stretches: np.ndarray) -> np.ndarray:
-    """Return the mask of the points at which a membrane is in compression, and therefore wrinkles.
+def smaller_stress(stretches: np.ndarray) -> np.ndarray:
+    r"""Return the smaller principal stress of a neo-Hookean membrane over its shear modulus.
+
+    .. math:: \lambda_2^2 - (\lambda_1 \lambda_2)^{-2}
+
+    In compression it is negative for other materials, too.
 
     Args:
         stretches: principal stretches l1, l2 in the surface at n points, the larger first, shape (n, 2).
 
     Returns:
-        Mask, shape (n,), True where l2 < l1^(-1/2) or l1 < 1.
+        Stress over shear modulus, shape (n,).
     """
-    return (stretches[:, 1] < stretches[:, 0] ** -0.5 * (1 - 1e-9)) | (stretches[:, 0] < 1 - 1e-9)
+    return stretches[:, 1] ** 2 - stretches.prod(axis=1) ** -2
+
+
+def wrinkled(stretches: np.ndarray) -> np.ndarray:
+    """Return the mask of the points at which a membrane is in compression, and therefore wrinkles.
+
+    A sheet that sticks to a flat tool is compressed by the elastic slip of its points. Such negligible compression does
+    not count.
+
+    Args:
+        stretches: principal stretches l1, l2 in the surface at n points, the larger first, shape (n, 2).
+
+    Returns:
+        Mask, shape (n,), True where `smaller_stress` is below -1e-3.
+    """
+    return smaller_stress(stretches) < -NEGLIGIBLE
