@@ -110,7 +110,7 @@ class StateSolver:
         history: list[Iteration] = []
         self._x.set(0)
         self.problem.residual(self._x, 0.0, self.newton.F)
-        if relative(self.problem, self.newton.F.norm()) > Tolerances().residual:
+        if self._is_loaded():
             try:
                 _, history = self.newton.correct(self._x, 0.0, fixed(0.0))
             except Failure as failure:
@@ -125,6 +125,18 @@ class StateSolver:
                                        " no stiffness")
             self._x.set(0)
         return self._state(0.0, history, "start", None)
+
+    def _is_loaded(self) -> bool:
+        """Return True if the residual F in the reference configuration, stored in the solver, exceeds round-off.
+
+        Stresses that cancel there leave forces of round-off, eps times the shear modulus times length over thickness.
+        The square root of the norm of dF/dx estimates the last two factors.
+        """
+        forces = self.newton.F.norm()
+        if relative(self.problem, forces) <= Tolerances().residual:
+            return False
+        stiffness = self.problem.tangent(self._x, 0.0).norm(PETSc.NormType.NORM_INFINITY)
+        return bool(forces > np.finfo(float).eps * np.sqrt(stiffness))
 
     def resume(self, x: Array, control: float) -> State:
         """Return a known solution as the first state of a path.
