@@ -1,4 +1,4 @@
-"""Error of the wall and cost of `accuracy=` for sheets that tools touch, in ten moulds, beside uniform meshes.
+"""Error of the wall and cost of `accuracy=` for sheets that tools touch, in twelve moulds, beside uniform meshes.
 
     ./fx python3 benchmarks/accuracy_in_moulds.py [--only cup tub] [--again] [--references FILE]
 
@@ -29,7 +29,8 @@ BODIES = {"cup": {"radius": 10.0, "thickness": 0.3}, "trough": {"radius": 10.0, 
           "pot": {"radius": 40.0, "thickness": 1.2}, "bottle": {"inner_radius": 1.1, "thickness": 0.3, "length": 10.6},
           "dish": {"radius": 50.0, "thickness": 1.0}, "tub": {"radius": 32.0, "thickness": 1.2},
           "stepped": {"radius": 34.0, "thickness": 1.0}, "ribbed": {"radius": 42.0, "thickness": 1.0},
-          "thin": {"radius": 57.0, "thickness": 0.19}, "tray": {"radius": 48.0, "thickness": 2.5}}
+          "thin": {"radius": 57.0, "thickness": 0.19}, "tray": {"radius": 48.0, "thickness": 2.5},
+          "sliding_cup": {"radius": 10.0, "thickness": 0.3}, "slippery_dish": {"radius": 50.0, "thickness": 1.0}}
 
 
 def body(name, **given):
@@ -37,18 +38,18 @@ def body(name, **given):
     return (fx.mesh.parison if name == "bottle" else fx.mesh.disc)(**BODIES[name], **given)
 
 
-def in_mould(mesh, material, tool, pressure, kinematics=None):
-    """Return the path of a sheet that sticks to a mould above it, up to a pressure."""
+def in_mould(mesh, material, tool, pressure, kinematics=None, friction="stick"):
+    """Return the path of a sheet that is blown into a mould above it, up to a pressure."""
     scene = fx.Scene(mesh=mesh, materials=material, kinematics=kinematics,
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
-                     contacts=[fx.Contact("top", tool, "stick")])
+                     contacts=[fx.Contact("top", tool, friction)])
     return fx.trace(scene, until=fx.pressure(pressure), progress=False)
 
 
-def cup(mesh, kinematics=None):
+def cup(mesh, kinematics=None, friction="stick"):
     """Return the path of demos/cup.py; cm, psi."""
     return in_mould(mesh, fx.MooneyRivlin(c10=50.0, c01=15.0),
-                    fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0), 160.0, kinematics)
+                    fx.tools.cup(radius=10.0, depth=5.0, mouth=0.3, fillet=1.0), 160.0, kinematics, friction)
 
 
 def trough(mesh):
@@ -76,11 +77,11 @@ def bottle(mesh):
     return fx.trace(scene, until=fx.pressure(200.0), progress=False)
 
 
-def dish(mesh):
+def dish(mesh, friction="stick"):
     """Return the path of a conical dish with a rounded step half-way up; mm, MPa."""
     tool = fx.tools.Tool([(0.0, 26.0), (22.0, 26.0), (30.0, 14.0), (38.0, 14.0), (48.0, 1.0), (100.0, 1.0)],
                          [0.0, 4.0, 3.0, 3.0, 2.0, 0.0])
-    return in_mould(mesh, fx.NeoHookean(c10=0.3), tool, 0.3)
+    return in_mould(mesh, fx.NeoHookean(c10=0.3), tool, 0.3, friction=friction)
 
 
 def tub(mesh):
@@ -115,7 +116,18 @@ def tray(mesh):
     return in_mould(mesh, fx.NeoHookean(c10=0.4), tool, 0.4)
 
 
-MOULDS = {run.__name__: run for run in (cup, pot, bottle, trough, dish, tub, stepped, ribbed, thin, tray)}
+def sliding_cup(mesh):
+    """Return the path of the cup with a coefficient of friction of 0.3."""
+    return cup(mesh, friction=0.3)
+
+
+def slippery_dish(mesh):
+    """Return the path of the dish without friction."""
+    return dish(mesh, friction="none")
+
+
+MOULDS = {run.__name__: run for run in (cup, pot, bottle, trough, dish, tub, stepped, ribbed, thin, tray, sliding_cup,
+                                        slippery_dish)}
 
 
 def wall(path):
