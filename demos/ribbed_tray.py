@@ -116,7 +116,9 @@ def main():
         write_mould(args.out / "mould.stl", step)
     COMM.Barrier()
     mould = fx.tools.solid(args.out / "mould.stl")
-    summary = {"mould": {"triangles": mould.triangles, **mould.undercuts()}, "around_radius_mm": AROUND,
+    undercuts = mould.undercuts()
+    summary = {"mould": {"triangles": mould.triangles, "undercut_area": undercuts["undercut_area"],
+                         "least_draft": undercuts["min_draft"]}, "around_radius_mm": AROUND,
                "adapted_wall_change": CHANGE}
     path, names = None, [*(f"size_{size:g}" for size in sizes), *(f"adapted_{k + 1}" for k in range(more))]
     for name in names:
