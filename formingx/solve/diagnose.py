@@ -402,4 +402,5 @@ def _round_off_findings(run: FailedRun) -> Iterator[Finding]:
         yield Finding("warning", "round-off",
                       f"round-off: the condition number of the tangent stiffness is {facts['condition']:.1g}, and"
                       f" hardly any of 16 digits are left",
-                      "a larger eps, a lower contact penalty, or layers that differ less in stiffness")
+                      "more elements along a film, or Membrane(); a larger eps, a lower contact penalty, or layers that"
+                      " differ less in stiffness")
