@@ -22,7 +22,7 @@ def plug():
 @pytest.mark.parametrize("shown, level", [(True, logging.WARNING), (False, logging.INFO)])
 def test_a_long_run_logs_its_progress(shown, level, monkeypatch, caplog):
     """Each line: how far, what limits the steps, and how long it will take; seen without asking if there is a bar."""
-    monkeypatch.setattr(progress.Progress, "silence", 1e-3)    # a fast machine needs 0.04 s for the run
+    monkeypatch.setattr(progress.Progress, "silence", 1e-3)    # a fast machine needs 0.06 s for the run
     with caplog.at_level(logging.INFO, "formingx"):
         fx.trace(plug(), until=fx.travel(15.0), progress=shown)
     lines = [r for r in caplog.records if "of the way in" in r.getMessage()]
