@@ -11,7 +11,7 @@ import argparse
 import random
 from pathlib import Path
 
-from accuracy_in_moulds import PROMISED, elements, error, finest, wall
+from accuracy_in_moulds import PROMISED, elements, error, finest, in_mould, wall
 from mpi4py import MPI
 
 import formingx as fx
@@ -57,10 +57,7 @@ def scene(seed):
     tool, pressure = shape(draw, R, h, lip), (1.5 if shape is narrow else 1.0) * h / R * draw(8, 18)
 
     def run(mesh):
-        return fx.trace(fx.Scene(mesh=mesh, materials=material, kinematics=kinematics, loads=[fx.Pressure("bottom")],
-                                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                                 contacts=[fx.Contact("top", tool, friction)]),
-                        until=fx.pressure(pressure), progress=False)
+        return in_mould(mesh, material, tool, pressure, kinematics, friction)
     plane = ", plane" if kinematics else ""
     name = f"{shape.__name__}, R {R:g}, h/R {h / R:.2g}, {type(material).__name__}, {friction}{plane}"
     return name, run, {"radius": R + 0.9 * lip, "thickness": h}

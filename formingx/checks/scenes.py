@@ -171,7 +171,7 @@ def _volume_penalty(body: Body) -> Iterator[Finding]:
     change = model.eps * stretch**2 / 8
     if change > 0.01:
         yield Finding("warning", repr(type(model).__name__), f"eps = {model.eps:g} lets the volume change by about"
-                      f" {100 * change:.2g} % at a stretch of {stretch:g}: use {0.008 / stretch**2:.1g} or less")
+                      f" {percent(change)} at a stretch of {stretch:g}: use {0.008 / stretch**2:.1g} or less")
     if isinstance(model, DisplacementPenalty):
         if model.points == 4 and model.eps <= 1e-3:
             yield Finding("warning", "DisplacementPenalty", f"points = 4 with eps = {model.eps:g}: the tangent becomes"

@@ -23,16 +23,17 @@ class Fineness(NamedTuple):
 
     Attributes:
         along: number of columns along a sheet without fillets and constrained ends.
-        end: largest number of elements through the sheet for which columns at a constrained end become shorter.
-        most: largest number of elements through the sheet.
+        max_through_at_end: number of elements through the sheet up to which more of them shorten the columns at a
+            constrained end.
+        max_through: largest number of elements through the sheet.
         even: distance from a constrained end up to which the columns have their shortest length, over the thickness.
         height: largest height over length of an element on a fillet, both in the reference configuration.
         promised: largest relative error of the wall.
     """
 
     along: int
-    end: int
-    most: int
+    max_through_at_end: int
+    max_through: int
     even: float
     height: float
     promised: float
@@ -56,8 +57,8 @@ _POSITION_ERROR = 0.03
 sheet the error may be twice as large, in a curved sheet three times."""
 
 _END_COLUMN_LENGTH = 0.5
-"""Length of a column at a constrained end over the height of an element there, of at most `Fineness.end` elements
-through the sheet. Shorter columns lock, longer ones miss the bending."""
+"""Length of a column at a constrained end over the height of an element there, of at most `max_through_at_end` elements
+through the sheet (`Fineness`). Shorter columns lock, longer ones miss the bending."""
 
 _ALONG_CONCAVE = 0.0155
 """Relative error of the wall on a concave fillet if the deformed columns are as long as its radius and the sheet is not
@@ -66,7 +67,7 @@ stretched (`_column_length`)."""
 _ALONG_CONVEX = 0.65
 """The same error on a fillet behind which the wall is e times as thick as in front of it."""
 
-_LEAST_STEP = 0.16
+_MIN_WALL_CHANGE = 0.16
 """Smallest change of the logarithm of the wall that is expected over a fillet."""
 
 _ON_FLAT = 0.012
@@ -132,7 +133,8 @@ def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[Fillet
                      constrained: list[float], thickness: float, fineness: Fineness) -> tuple[np.ndarray, int]:
     """Return the largest lengths of columns, shape (n,), and the number of elements through the sheet.
 
-    They are those with the fewest unknowns among all that keep the promised error on every fillet.
+    They are those with the fewest unknowns among all that keep the promised error on every fillet. If none does, the
+    number of elements through the sheet is the largest.
 
     Args:
         s: lengths along the sheet from its start to n points, shape (n,), length.
@@ -143,7 +145,7 @@ def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[Fillet
         fineness: sizes of the elements.
     """
     choices, longest = [], s[-1] / fineness.along
-    for through in range(1, fineness.most + 1):
+    for through in range(1, fineness.max_through + 1):
         errors, lengths, sizes = [0.0], [longest], [size]
         for fillet, inside, distance in fillets:
             errors.append(_error_through(fillet, thickness, through, inside) / fineness.promised)
@@ -152,7 +154,7 @@ def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[Fillet
             sizes.append(lengths[-1] + GROWTH * distance)
         for end in constrained:
             distance = np.maximum(np.abs(s - end) - fineness.even * thickness, 0.0)
-            sizes.append(_END_COLUMN_LENGTH * thickness / min(through, fineness.end) + GROWTH * distance)
+            sizes.append(_END_COLUMN_LENGTH * thickness / min(through, fineness.max_through_at_end) + GROWTH * distance)
         smallest = np.minimum.reduce(sizes)
         fails = max(errors) > 1 or thickness > fineness.height * through * min(lengths)
         unknowns = number_of_columns(s, smallest)[-1] * (18 * through + 4)
@@ -233,7 +235,7 @@ def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside
     relative = min(_bend(fillet, thickness), 1.0) / max(fillet.area_ratio, 1e-6)
     error = _THROUGH * relative / fillet.stretch / through**1.75
     if inside and not fillet.concave:
-        error = max(error, _THROUGH_CONVEX * fillet.step * relative**1.5 / through**2)
+        error = max(error, _THROUGH_CONVEX * fillet.wall_change * relative**1.5 / through**2)
     return float(error)
 
 
@@ -250,8 +252,8 @@ def _column_length(fillet: FilletInSheet, error: float) -> float:
         fillet: the fillet.
         error: relative error of the wall.
     """
-    step = max(fillet.step, _LEAST_STEP)
-    relative = np.sqrt(error / (_ALONG_CONVEX * step))
+    change = max(fillet.wall_change, _MIN_WALL_CHANGE)
+    relative = np.sqrt(error / (_ALONG_CONVEX * change))
     if fillet.concave:
         relative = min(relative, fillet.stretch**1.5 * (error / _ALONG_CONCAVE) ** (1 / 1.75))
     return float(fillet.stretch * fillet.radius * relative)

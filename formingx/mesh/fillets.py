@@ -28,7 +28,7 @@ class FilletInSheet(NamedTuple):
         stretch: inverse stretch of the sheet on the fillet along the section, reference over deformed length.
         area_ratio: reference over deformed area there, which equals deformed over reference thickness.
         concave: True if the sheet bridges the fillet before it touches it.
-        step: absolute change of the logarithm of the wall over the fillet.
+        wall_change: absolute change of the logarithm of the wall over the fillet.
     """
 
     first: float
@@ -38,7 +38,7 @@ class FilletInSheet(NamedTuple):
     stretch: float
     area_ratio: float
     concave: bool
-    step: float
+    wall_change: float
 
 
 class FlatsInSheet(NamedTuple):
@@ -88,7 +88,7 @@ class _Touched(NamedTuple):
         mean = self.reference_radii[group].mean(), self.points[group, 0].mean()
         return stretch, stretch * (mean[0] / max(mean[1], 1e-300) if axisymmetric else 1.0)
 
-    def step(self, axisymmetric: bool, group: np.ndarray) -> float:
+    def wall_change(self, axisymmetric: bool, group: np.ndarray) -> float:
         """Return the absolute change of the logarithm of the wall over a group of points.
 
         Args:
@@ -142,7 +142,7 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
         stretch, area_ratio = found.stretches(axisymmetric, group)
         concave = bool(found.free_radii[group[len(group) // 2]] < 1.5 * radius)
         yield FilletInSheet(first, last, radius, 1 - np.cos(angle), stretch, area_ratio, concave,
-                            found.step(axisymmetric, group))
+                            found.wall_change(axisymmetric, group))
 
 
 def flats_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool) -> FlatsInSheet:

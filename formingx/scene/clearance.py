@@ -42,9 +42,7 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
                     scene.check_travel(tools[i], ends[i])
                 except InputError as error:
                     raise InputError(f"{plan.stage.label}: {error}") from None
-            for part in np.linspace(0, 1, PIECE_POINTS) if ends != travels else [1.0]:
-                current = {i: travels[i] + part * (ends[i] - travels[i]) for i in tools}
-                _check_overlap(scene, plan.stage.label, present, outlines, current)
+            _check_motion(scene, plan.stage.label, present, outlines, (travels, ends))
             travels = ends
     return unknown
 
@@ -63,9 +61,28 @@ def check_target(scene: Scene, target: Any) -> None:
         return
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
-    for travel in target.value * np.linspace(0, 1, PIECE_POINTS):
-        travels = {i: travel if tool.driven else 0.0 for i, tool in tools.items()}
-        _check_overlap(scene, str(target), tools, outlines, travels)
+    start, end = ({i: travel * tool.driven for i, tool in tools.items()} for travel in (0.0, target.value))
+    _check_motion(scene, str(target), tools, outlines, (start, end))
+
+
+def _check_motion(scene: Scene, label: str, tools: dict[int, Contact], outlines: dict[int, Any],
+                  travels: tuple[dict[int, float], dict[int, float]]) -> None:
+    """Check that tools do not overlap at some positions of a motion.
+
+    Args:
+        scene: the `Scene`.
+        label: stage or target, for the message.
+        tools: the tools, {number in `Scene.items`: contact}.
+        outlines: their outlines, {number: result of `_outline`}.
+        travels: travels of the tools, {number: length}, at the start and at the end.
+
+    Raises:
+        InputError: two tools overlap.
+    """
+    start, end = travels
+    for part in np.linspace(0, 1, PIECE_POINTS) if end != start else [1.0]:
+        current = {i: start[i] + part * (end[i] - start[i]) for i in start}
+        _check_overlap(scene, label, tools, outlines, current)
 
 
 def _break_points(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, float]]:

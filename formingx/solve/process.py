@@ -434,9 +434,8 @@ def begin(curve: Curve) -> State:
 def _no_start(curve: Curve, failure: Failure) -> ConvergenceError:
     """Return the error of a run without a first state; `failure`: the failure of Newton's method."""
     loads = curve.problem.fixed_loads
-    words, advice = (f", under {', '.join(loads)}", "drive the largest of them instead") if loads else (
-        "", "a tool touches the body at rest: give its Contact a smaller ramp" if curve.problem.active_contacts else
-        "round-off is as large as the forces where elements are too long for their height, see formingx.check(scene):"
-        " use more elements along the sheet, or Membrane()")
-    return ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason}; {advice}",
+    words = f", under {', '.join(loads)}" if loads else ""
+    touches = "; a tool touches the body at rest: give its Contact a smaller ramp" * bool(curve.problem.active_contacts)
+    advice = "; drive the largest of them instead" if loads else touches
+    return ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason}{advice}",
                             diagnosis=diagnose(curve, [], failure.reason, failure.attempt))

@@ -14,6 +14,8 @@ from .tolerances import FAR
 
 ABSOLUTE_ZERO = {"C": -273.15, "K": 0.0}
 """{unit of temperature: absolute zero in this unit}."""
+DEGREES = {"C": "°C", "K": "K"}
+"""{unit of temperature: its symbol in reports and pictures}."""
 EVERYWHERE = (-np.inf, np.inf)
 """Lowest and highest temperature of a function that is known at all temperatures."""
 GAS_CONSTANT = 8.31446261815324

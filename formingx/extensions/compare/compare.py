@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...errors import InputError, as_list, check_name, check_type
+from ...findings import percent
 from ...io import csv_files
 from ...results import files
 from ...results.show import plots
@@ -215,7 +216,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
 
 def _percent(share: float) -> str:
     """Return a ratio in percent as text of ten characters."""
-    return f"{f'{100 * share:.2g} %':>10}"
+    return f"{percent(share):>10}"
 
 
 def _table(side: str, given: Any) -> csv_files.CsvTable:

@@ -11,6 +11,7 @@ import numpy as np
 
 from ... import mesh as meshes
 from ...errors import InputError, check_name
+from ...findings import percent
 from ...forms.probes import probe
 from ...io import csv_files
 from ...mesh import text as grid
@@ -63,9 +64,9 @@ class NodalComparison:
             (self.points, 6), (self.ours, 8), (self.theirs, 8)))
         size, reference = self.largest or 1.0, ", ".join(_COORDINATES_OF[self.ours.shape[1]])
         return (f"{len(self.nodes)} nodes; our largest displacement is {self.largest:.6g}\n"
-                f"largest difference {self.maximum:.5g} ({100 * self.maximum / size:.2g} %), at node {self.nodes[k]},"
+                f"largest difference {self.maximum:.5g} ({percent(self.maximum / size)}), at node {self.nodes[k]},"
                 f" ({reference}) = ({position}): ours ({ours}), theirs ({theirs})\n"
-                f"root mean square {self.rms:.5g} ({100 * self.rms / size:.2g} %)")
+                f"root mean square {self.rms:.5g} ({percent(self.rms / size)})")
 
     __repr__ = __str__
 

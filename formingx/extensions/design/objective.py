@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, finite, pair, values
+from ...findings import percent
 from ...values.tolerances import MEASURED_ACCURACY, NOTICEABLE
 from .run import DesignRun
 
@@ -193,13 +194,13 @@ class WallObjective:
         names = ", ".join(name for name, at_bound in zip(p.names, at_bounds) if at_bound)
         limits = []
         if free < SETTINGS.limiting_share * present and self.volume is not None:
-            limits.append(f"the volume, which is held at {self.volume:.5g} (volume=None would leave {100 * free:.2g} %"
+            limits.append(f"the volume, which is held at {self.volume:.5g} (volume=None would leave {percent(free)}"
                           f" of deviation on the mean)")
         if unbounded < SETTINGS.limiting_share * present and names:
-            limits.append(f"bounds: {names} (wider ones would leave {100 * unbounded:.2g} %)")
+            limits.append(f"bounds: {names} (wider ones would leave {percent(unbounded)})")
         if limits:
-            return f"It is stopped by {'; '.join(limits)}; now it is {100 * present:.2g} %"
-        return f"These parameters bring it no nearer: by the derivatives {100 * present:.2g} % is left on the mean"
+            return f"It is stopped by {'; '.join(limits)}; now it is {percent(present)}"
+        return f"These parameters bring it no nearer: by the derivatives {percent(present)} is left on the mean"
 
 
 class MeasuredWallObjective(WallObjective):

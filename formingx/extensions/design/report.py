@@ -259,7 +259,7 @@ def _uncertainties(run: Any, deviations: Any, units: Units) -> list[str]:
         value, slope = run.derivative(name)
         if np.all(np.isfinite([value[0], *slope[0]])):
             rows.append((units.label(name), value[0], slope[0]))
-    table = [[name, page.number(value), f"{size:.3g}", f"{100 * size / abs(value):.2g} %" if value else ""]
+    table = [[name, page.number(value), f"{size:.3g}", percent(size / abs(value)) if value else ""]
              for name, value, slope in rows for size in [deviations_of(slope[None], covariance)[0]]]
     return ["<h2>How sure</h2>", page.table(["", "value", "standard deviation", ""], table),
             "<p class=lead>To first order in the uncertain parameters. The volume times the density is the weight. The"

@@ -11,6 +11,7 @@ import numpy as np
 
 from ...errors import InputError, file_path
 from ...figures import Axes
+from ...findings import percent
 from ...materials.material import Material
 from ...materials.relaxing import GeneralisedMaxwell
 from ...values.intervals import t_intervals
@@ -94,7 +95,7 @@ class Fit(NamedTuple):
         return draw_fit(self.material, self.data, axes, unit, unit_of_time)
 
     def __str__(self) -> str:
-        parts = ", ".join(f"{mode} {value:.4g} ({100 * self.deviations[mode]:.2g} %)"
+        parts = ", ".join(f"{mode} {value:.4g} ({percent(self.deviations[mode])})"
                           for mode, value in self.rms.items())
         undetermined = f"; the data do not determine {', '.join(self.undetermined)}" if self.undetermined else ""
         return f"{self.material}: rms {self.rms_total:.4g} ({parts}){undetermined}"

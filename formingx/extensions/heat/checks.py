@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...findings import Finding, register
+from ...findings import Finding, percent, register
 from ...materials.constants import OfTemperature
 from ...materials.solidification import Solidification
 from ...values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
@@ -102,7 +102,7 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
         advice = f", such as elements=(n, {[float(f'{size:.2g}') for size in sizes]}), from the bottom up"
     yield Finding("warning", f"boundary {face!r}",
                   f"it is chilled, and the elements along it are {height:.3g} thick, in a wall of {body.thickness:.3g}:"
-                  f" temperatures will be off by about {100 * error:.2g} % of their span: use {needed} layers of equal"
+                  f" temperatures will be off by about {percent(error)} of their span: use {needed} layers of equal"
                   f" elements, or thin ones at this face{advice}")
 
 

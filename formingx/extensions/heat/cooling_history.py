@@ -118,7 +118,8 @@ class CoolingHistory:
                     for body, touching in ((self._body, self._contacts), (finer, tool_contacts)):
                         _set_conductances(body, touching, state.control)
                         body.update()
-                    found.append((estimator.largest(self._state, self._time), self._contact_end(estimator.place)))
+                    error, place = estimator.largest(self._state, self._time)
+                    found.append((error, self._contact_end(place)))
         finally:
             self._body.power = power
             estimator.destroy()

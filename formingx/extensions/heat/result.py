@@ -9,6 +9,7 @@ from ...errors import InputError, check_name, finite
 from ...ranks import gathered
 from ...results import files
 from ...scene.fields import PointReader
+from ...values.temperature import DEGREES
 from .conduction import Conduction
 
 _LINE_POINTS = 201
@@ -316,7 +317,7 @@ class HeatRun:
         for k, (t, row) in enumerate(zip(chosen, T)):
             shade = {"color": _colour(k, len(chosen))} | style
             axes.plot(scale * distance, row, **{"label": f"t = {t:g}"} | shade)
-        axes.set(xlabel="distance through the thickness", ylabel=f"temperature, {_DEGREES[self.unit]}")
+        axes.set(xlabel="distance through the thickness", ylabel=f"temperature, {DEGREES[self.unit]}")
         return axes
 
     def _unique_names(self) -> list[str]:
@@ -405,9 +406,6 @@ class HeatRun:
                 return t if before is None or excess(before) <= 0 else float(brentq(excess, before, t, xtol=1e-9 * t))
             before = t
         return None
-
-
-_DEGREES = {"C": "°C", "K": "K"}
 
 
 def _colour(k: int, n: int) -> Any:

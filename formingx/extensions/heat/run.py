@@ -206,7 +206,7 @@ def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
         tolerance: largest estimated time integration error of one step, degrees.
     """
     try:
-        run.errors_in_space = np.array([estimator.largest(run.states[k], run.times[k])
+        run.errors_in_space = np.array([estimator.largest(run.states[k], run.times[k])[0]
                                         for k in np.searchsorted(run.times, run.outputs)])
     finally:
         estimator.destroy()

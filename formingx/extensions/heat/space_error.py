@@ -23,17 +23,13 @@ class SpaceError:
     Args:
         body: heat equation of the run, with quadratic elements.
         finer: heat equation of the same body with cubic elements; `destroy` frees it.
-
-    Attributes:
-        place: reference position of the largest error in the body that `largest` estimated last, shape (2,), length.
     """
 
     def __init__(self, body: Conduction, finer: Conduction):
         self._body, self._finer = body, finer
         self._values, self._cubic_values = fem.Function(body.space), fem.Function(finer.space)
-        self.place: np.ndarray = np.zeros(2)
 
-    def largest(self, state: list[np.ndarray], time: float) -> float:
+    def largest(self, state: list[np.ndarray], time: float) -> tuple[float, np.ndarray]:
         """Estimate the largest discretisation error of the temperature in a state; collective.
 
         The estimate is the largest absolute nodal value of a correction e in the space of cubic elements. It satisfies
@@ -46,7 +42,7 @@ class SpaceError:
             time: time since the start of the run.
 
         Returns:
-            Error, degrees.
+            Error, degrees. Reference position of the largest error in the body, shape (2,), length.
         """
         body, finer = self._body, self._finer
         slope = body.slope(body.rates(state)[0][0])
@@ -57,8 +53,7 @@ class SpaceError:
         error, change = finer.difference([residual, *map(np.zeros_like, in_tools)], time)
         own = np.column_stack([np.abs(change), finer.points])
         rows = gathered(body.comm, own[np.argsort(own[:, 0])[-1:]])
-        self.place = rows[np.argmax(rows[:, 0]), 1:3]
-        return error
+        return error, rows[np.argmax(rows[:, 0]), 1:3]
 
     def destroy(self) -> None:
         """Free the PETSc objects of `finer` (collective)."""

@@ -118,7 +118,7 @@ class AdmissibilityCheck:
                 if error > WARNED_ERROR:
                     name = contact.contact.label
                     found.append(Finding("warning", name, f"Penetration changes the force on the tool of {name!r} by"
-                                         f" about {100 * error:.2g} %: {_penalty_advice(contact, error)}."))
+                                         f" about {percent(error)}: {_penalty_advice(contact, error)}."))
             for cut in self._deepest(edges, lengths, state, on_face=True):
                 found.append(Finding("warning", cut.name, f"Between contact points the face is {cut.depth:.3g} deep in"
                                      f" the tool of {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}):"
@@ -161,7 +161,7 @@ class AdmissibilityCheck:
                 if error > LARGE_ERROR and resultants.penetration(
                         contact, state.x, state.control) > NEGLIGIBLE * contact.thickness:
                     yield (f"the body did not follow the tool of {contact.contact.label!r}: penetration changes"
-                           f" the force by about {100 * error:.2g} %: {_penalty_advice(contact, error)}")
+                           f" the force by about {percent(error)}: {_penalty_advice(contact, error)}")
                 if _pulled(contact, state):
                     yield (f"the body pulls at the tool of {contact.contact.label!r}, which has no friction and cannot"
                            f" hold it: it is behind the tool")

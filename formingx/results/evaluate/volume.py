@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ...findings import Finding
+from ...findings import Finding, percent
 from ...physics.supports import Clamped
 from ...values.tolerances import NOTICEABLE
 
@@ -33,12 +33,12 @@ def findings(error: float, where: str, far_error: float | None = None) -> list[F
         return []
     if far_error is not None and far_error <= 4 * NOTICEABLE:
         return [Finding("note", "volume", f"The elements at the corner of a clamped face do not keep their volumes: the"
-                        f" root mean square of J - 1 is {100 * error:.2g} % ({where}), and {100 * far_error:.2g} % from"
+                        f" root mean square of J - 1 is {percent(error)} ({where}), and {percent(far_error)} from"
                         f" {_CORNER_DISTANCE:g} lengths of that face on. The corner is singular: take no stresses from"
                         " there.")]
     return [Finding("warning" if error > 4 * NOTICEABLE else "note", "volume",
                     f"The elements do not keep their volumes: the root mean square of J - 1 is up to"
-                    f" {100 * error:.2g} % ({where}): use a finer mesh.")]
+                    f" {percent(error)} ({where}): use a finer mesh.")]
 
 
 def away_from_clamps(path: Any) -> float | None:

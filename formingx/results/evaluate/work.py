@@ -23,7 +23,7 @@ from ...contact import resultants
 from ...contact.step_limit import TrialStep
 from ...contact.tooling import Tooling
 from ...errors import InputError
-from ...findings import Finding, log_findings
+from ...findings import Finding, log_findings, percent
 from ...solve.newton import Failure
 from ...values.tolerances import DIFFERENCE_STEP, NOTICEABLE
 from .step_polynomials import GAUSS, Polynomial, integral, interpolate
@@ -409,7 +409,7 @@ def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
     k = int(np.argmax(unbalanced))
     if unbalanced[k] <= NOTICEABLE * size:
         return []
-    return [Finding("warning", "energy", f"The energy balance is off by {100 * unbalanced[k] / size:.2g} % of the"
+    return [Finding("warning", "energy", f"The energy balance is off by {percent(unbalanced[k] / size)} of the"
                     f" largest entry, up to state {k} ({100 * NOTICEABLE:g} % is usual): the states are too few for"
                     f" the work between them, contact is too soft, or the run is not accurate. Use shorter steps,"
                     f" StepControl(largest=...), and see path.work().")]

@@ -9,9 +9,10 @@ import numpy as np
 
 from ...contact.tooling import Tooling
 from ...errors import InputError
-from ...findings import Finding, worst_first
+from ...findings import Finding, percent, worst_first
 from ...mesh.nodes import nearest
 from ...scene.symmetry import NO_PLANES, MirrorPlanes
+from ...values.temperature import DEGREES
 from ...values.tolerances import LARGE_ERROR, NEGLIGIBLE, NOTICEABLE
 from .. import files
 from ..evaluate import volume
@@ -150,13 +151,13 @@ class ReportData:
             if thickness is not None and deep > LARGE_ERROR * thickness:
                 begins = self._first(self.measures["penetration"] > LARGE_ERROR * thickness)
                 found.append(Finding("warning" if deep > 4 * LARGE_ERROR * thickness else "note", "penetration",
-                                     f"The body penetrates a tool by {deep:.3g}, {100 * deep / thickness:.2g} % of its"
+                                     f"The body penetrates a tool by {deep:.3g}, {percent(deep / thickness)} of its"
                                      f" smallest thickness{begins}: a larger contact penalty reduces it."))
         worst = np.abs(self.measures["mass_error"]).max()
         if worst > NEGLIGIBLE:
             begins = self._first(np.abs(self.measures["mass_error"]) > NEGLIGIBLE)
             found.append(Finding("warning" if worst > 10 * NEGLIGIBLE else "note", "mass",
-                                 f"The mass changes by up to {100 * worst:.2g} %{begins}: use a smaller eps or a finer"
+                                 f"The mass changes by up to {percent(worst)}{begins}: use a smaller eps or a finer"
                                  f" mesh."))
         found += [*self._volume_findings(), *self._admissibility_findings()]
         subjects = {finding.about for finding in found}      # these are on all states, `self.findings` on the last one
@@ -307,7 +308,7 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
     def described(tool):
         return f"{tool:g}" if isinstance(tool, int | float) else f"{tool['start']:g} at first, {tool['back']:g} behind"
     return {"heat": {name: (conductance, described(tool)) for name, (conductance, tool) in heat["tools"].items()},
-            "unit": {"C": "°C"}.get(heat["unit"], heat["unit"])}
+            "unit": DEGREES[heat["unit"]]}
 
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
