@@ -6,14 +6,12 @@ from typing import Any
 import numpy as np
 
 from ...findings import Finding, register
-from ...physics.supports import NAMES, Symmetry
+from ...physics.supports import Symmetry
 from ...ranks import gathered
-from ...scene.contact_checks import OTHER_UNIT
 from ...tools.pieces import Arc
 from ...values.tolerances import NEGLIGIBLE
 from .solid_tool import Swept
 from .surface import smaller_stress
-from .triangulated import Triangulated
 
 
 @register("end")
@@ -37,27 +35,6 @@ def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
         yield Finding("serious", "membrane", f"{100 * share:.3g} % of the sheet is in compression in the last state,"
                       f" most at (x, y, z) = ({place}): it wrinkles there, and its wall depends on the mesh: use"
                       f" Membrane(wrinkles=0.01), and look at path.wall().wrinkled.")
-
-
-@register("start")
-def other_unit_of_length(body: Any) -> Iterator[Finding]:
-    """Find tools from STL files that are more than 4 times as wide as the sheet: a file states no unit of length.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each such tool.
-    """
-    scene = body.scene
-    for contact in scene.contacts:
-        if scene.kinematics.components == 3 and isinstance(contact.tool, Triangulated) and contact.direction is None:
-            cut = [any(isinstance(s, Symmetry) and NAMES[s.component] == axis for s in scene.supports) for axis in "xy"]
-            sheet = max((1 + half) * float(length) for half, length in zip(cut, scene.extent))
-            ratio = float(np.ptp(contact.tool.bounds, axis=0)[:2].max() / sheet)
-            if ratio > OTHER_UNIT:
-                yield Finding("warning", repr(contact), f"the tool is {ratio:.3g} times as wide as the sheet: is its"
-                              f" file in another unit of length? Give solid a scale=...")
 
 
 @register("start")
@@ -109,7 +86,7 @@ def asymmetric_across_planes(body: Any) -> Iterator[Finding]:
     nodes = gathered(mesh.comm, mesh.domain.geometry.x)
     size = float(np.ptp(nodes, axis=0).max())
     for support in (s for s in scene.supports if isinstance(s, Symmetry)):
-        axis = "xyz".index(NAMES[support.component])
+        axis = scene.kinematics.in_axes(support, support.constraints())[0].component
         plane = float(mesh.nodes_of(support.on)[0, axis])
         for contact in (c for c in scene.contacts if isinstance(c.tool, Swept)):
             low, high = contact.tool.bounds

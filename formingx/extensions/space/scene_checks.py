@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, call_on_all_ranks, check_name, finite, positive, values
+from ...mesh.nodes import SAME_PLACE
 from ...physics.loads import CentrifugalLoad, Pressure
-from ...physics.supports import PinnedNode
+from ...physics.supports import PinnedNode, Symmetry
 from ...ranks import gathered
 from .sheet import Sheet
 from .solid_tool import Swept
@@ -93,8 +94,8 @@ def refuse(scene: Any, heat: Any) -> None:
         heat: the heat conduction of the scene, or None.
 
     Raises:
-        InputError: a model other than a membrane, heat conduction, a centrifugal load, a pressure on an edge, or a
-            pinned node.
+        InputError: a model other than a membrane, heat conduction, a centrifugal load, a pressure on an edge, a
+            pinned node, or a `Symmetry` of an edge that does not lie in a plane normal to its axis.
     """
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in three dimensions is a Membrane(): solids in three"
@@ -113,6 +114,22 @@ def refuse(scene: Any, heat: Any) -> None:
         if isinstance(support, PinnedNode):
             raise InputError(f"Scene: {support!r}: a sheet in three dimensions is supported at its boundaries, not at"
                              " nodes")
+        if isinstance(support, Symmetry) and support.on in scene.mesh.boundaries:
+            _check_plane(scene, support)
+
+
+def _check_plane(scene: Any, support: Symmetry) -> None:
+    """Raise an InputError unless the edge of a `Symmetry` lies in a plane normal to its axis; collective."""
+    nodes = scene.mesh.nodes_of(support.on)
+    flat = np.ptp(nodes, axis=0) < SAME_PLACE * float(max(scene.extent))
+    (constraint,) = scene.kinematics.in_axes(support, support.constraints())
+    if flat[constraint.component]:
+        return
+    axis, along = "xyz"[constraint.component], nodes[:, constraint.component]
+    fitting = [f"Symmetry({support.on!r}, {name!r})" for name, constant in zip("xy", flat) if constant]
+    raise InputError(f"Scene: {support!r}: its plane of symmetry is normal to {axis}, but along the edge"
+                     f" {support.on!r} {axis} goes from {along.min():.6g} to {along.max():.6g}: must be"
+                     f" {fitting[0] if fitting else 'a straight edge along x or y; another edge can be Clamped'}")
 
 
 def check_contact(scene: Any, contact: Any) -> None:

@@ -1,0 +1,146 @@
+"""Checks of the size of fixed tools against a sheet in three dimensions."""
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...checks.mould_side import free_distance, moulds
+from ...findings import Finding, percent, register
+from ...materials.inflation import FreeInflation, first_peak
+from ...mesh.nodes import nearest
+from ...physics.contact import Contact
+from ...physics.supports import Symmetry
+from ...scene.contact_checks import OTHER_UNIT
+from ...values.tolerances import LARGE_ERROR
+from .triangulated import Triangulated
+
+
+@register("start")
+def sizes(body: Any) -> Iterator[Finding]:
+    """Find fixed tools that are more than 4 times wider or narrower than the sheet, as in another unit of length.
+
+    A wide tool from an STL file is always reported. The flange of a swept profile is arbitrary, so a wide one is
+    reported if the sheet is farther from it than the sheet is wide. A narrow tool is reported if it is a cavity.
+
+    Args:
+        body: the examined body, whose `scene` has the contacts.
+
+    Yields:
+        A finding for each such tool.
+    """
+    for contact in _fixed(body.scene):
+        tool, sheet = contact.tool, _whole_extent(body.scene)
+        file = isinstance(tool, Triangulated)
+        wide, whole = float(_widths(tool).max()), float(sheet.max())
+        points, ahead = _nodes_and_direction(body.scene, contact)
+        gap = float(-tool.signed_distance(points).max())
+        narrow = wide * OTHER_UNIT < whole and _is_cavity(tool, ahead)
+        if narrow or wide > OTHER_UNIT * whole and (file or gap > whole / 2):
+            advice = "is its file in another unit of length? Give solid a scale=..." if file else \
+                "are the units of length the same (mm and cm)?"
+            yield Finding("warning", repr(contact),
+                          f"the tool is {wide / whole:.3g} times as wide as the sheet: {advice}")
+
+
+@register("scene")
+def narrow_sheets(body: Any) -> Iterator[Finding]:
+    """Find sheets whose edge lies inside the mouth of a mould, farther than 5 % of their width from its wall.
+
+    Args:
+        body: the examined body, whose `scene` has the contacts.
+
+    Yields:
+        A finding for each such mould.
+    """
+    scene = body.scene
+    for contact in moulds(scene) if scene.kinematics.components == 3 else ():
+        tool = contact.tool
+        if not tool.sized:
+            continue
+        points, ahead = _nodes_and_direction(scene, contact)
+        gap = float(_distances_at_mouth(tool, points, ahead).min())
+        if gap > LARGE_ERROR * _whole_extent(scene).max():
+            yield Finding("warning", repr(contact), f"the mould is wider than the sheet: its mouth is"
+                          f" {body.format(gap, 'travel', 3)} or more away from the sheet on all sides, so the edge of"
+                          f" the sheet is held in the air: use a wider sheet, or a narrower mould")
+
+
+@register("start")
+def narrow_moulds(body: Any) -> Iterator[Finding]:
+    """Find moulds past whose end a sheet hangs, if a pressure of the run is more than the overhang bears alone.
+
+    The overhang bears about as much as a disc. The radius of the disc is the largest distance of a node without a tool
+    straight ahead from the nodes with one, and from the edges that are held.
+
+    Args:
+        body: the examined body, whose `scene` has the contacts.
+
+    Yields:
+        A finding for each face of the sheet with such moulds.
+    """
+    scene = body.scene
+    pressures = body.pressures() if scene.kinematics.components == 3 else []
+    if not pressures or any(material.varies for material in scene.materials.values()):
+        return
+    held = [scene.mesh.nodes_of(s.on) for s in scene.supports if not isinstance(s, Symmetry)]
+    for face in dict.fromkeys(contact.on for contact in _fixed(scene)):
+        contacts = [c for c in scene.contacts if c.direction is None and c.on == face]
+        points, ahead = _nodes_and_direction(scene, contacts[0])
+        ways = np.tile([0.0, 0.0, ahead], (len(points), 1))
+        met = np.any([np.isfinite(free_distance(c.tool, points, ways, 100 * body.length)) for c in contacts], axis=0)
+        if met.all() or not met.any():
+            continue
+        mouths = [_distances_at_mouth(c.tool, points[~met], ahead) for c in contacts if c.tool.sized]
+        distance = np.min([nearest(np.vstack([points[met], *held]), points[~met])[0], *mouths], axis=0)
+        layers = [(material, float(np.mean(scene.thickness[name](*points[:, :2].T))))
+                  for name, material in scene.materials.items()]
+        peak = first_peak(FreeInflation(layers, float(distance.max())).disc) if distance.any() else None
+        excessive = [entry for entry in pressures if peak is not None and abs(entry.value) > peak.pressure]
+        if excessive and peak is not None:
+            x, y, _ = points[~met][np.argmax(distance)]
+            yield Finding("warning", repr(contacts[0]), f"the sheet hangs past the end of the mould:"
+                          f" {percent(1 - met.mean())} of its nodes, as at (x, y) = ({x:.4g}, {y:.4g}), have no tool"
+                          f" straight ahead, and {excessive[0].text} is more than the"
+                          f" {body.format(peak.pressure, 'pressure')} that a sheet of this overhang bears: it would be"
+                          f" blown past the mould. Use a smaller sheet, or a mould with a wider flange")
+
+
+def _fixed(scene: Any) -> list[Contact]:
+    """Return the contacts of a sheet in three dimensions with fixed tools of finite size."""
+    return [c for c in scene.contacts if scene.kinematics.components == 3 and c.direction is None and c.tool.sized]
+
+
+def _whole_extent(scene: Any) -> np.ndarray:
+    """Return the extent along x and y of the whole sheet, of which a half or a quarter is modelled, shape (2,)."""
+    cut = [any(plane.axis == axis for plane in scene.symmetry.planes) for axis in (0, 1)]
+    return (1 + np.array(cut)) * scene.extent[:2]
+
+
+def _widths(tool: Any) -> np.ndarray:
+    """Return the widths of a tool along x and y, shape (2,), length; the arbitrary one of an extruded tool is 0."""
+    widths = np.ptp(tool.bounds, axis=0)[:2]
+    if getattr(tool, "kind", "") == "extruded":
+        widths["xy".index(tool.along)] = 0.0
+    return widths
+
+
+def _nodes_and_direction(scene: Any, contact: Contact) -> tuple[np.ndarray, float]:
+    """Return the nodes of the sheet, shape (n, 3), length, and the z of the unit normal out of a contact's face."""
+    return np.unique(scene.mesh.nodes_of(contact.on), axis=0), 1.0 if contact.on == "top" else -1.0
+
+
+def _distances_at_mouth(tool: Any, points: np.ndarray, ahead: float) -> np.ndarray:
+    """Return the distances of points from a tool after a shift along z to its end next to the sheet, (n,), length.
+
+    `points` have the shape (n, 3), length; `ahead` is the z of the unit normal of the sheet towards the tool.
+    """
+    mouth = tool.bounds[0 if ahead > 0 else 1, 2]
+    return -tool.signed_distance(np.column_stack([points[:, :2], np.full(len(points), mouth)]))
+
+
+def _is_cavity(tool: Any, ahead: float) -> bool:
+    """Return True if the middle of a tool is farther from the sheet than its rim; `ahead` is the z towards the tool."""
+    points = tool.surface()[0]
+    away = np.hypot(*(points[:, :2] - points[:, :2].mean(0)).T)
+    return bool(ahead * (points[np.argmin(away), 2] - points[np.argmax(away), 2]) > 0)

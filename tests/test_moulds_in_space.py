@@ -1,0 +1,74 @@
+"""Checks of sheets in three dimensions: planes of symmetry, and moulds that are wider or narrower than the sheet."""
+
+import re
+
+import numpy as np
+import pytest
+from test_space import disc
+
+import formingx as fx
+
+BOX = {"half": (1.0, 1.5), "depth": 0.8, "corner": 0.3, "fillet": 0.15, "lip": 0.05}
+
+
+def tray(scale, tool, size=0.1):
+    """Return the scene of a sheet that is `scale` times as large as the mouth of the box."""
+    outline = fx.mesh.rectangle(2 * scale, 3 * scale, corner=0.3 * scale, part="quarter")
+    return fx.Scene(mesh=fx.mesh.sheet(outline, size=size * scale), thickness=0.02, materials=fx.NeoHookean(c10=1.0),
+                    supports=[fx.Symmetry("x0"), fx.Symmetry("y0", "y"), fx.Clamped("rim")],
+                    loads=[fx.Pressure("top")], contacts=[fx.Contact("bottom", tool)])
+
+
+@pytest.fixture(scope="module")
+def moulds(tmp_path_factory):
+    file = tmp_path_factory.mktemp("mould") / "mould.stl"
+    swept = fx.tools.box(**BOX)
+    swept.to_stl(file, wall=0.3)
+    return {"box": swept, "file": fx.tools.solid(file)}
+
+
+@pytest.mark.parametrize("supports, words", [
+    ([fx.Symmetry("x0", "y"), fx.Symmetry("y0", "y")], r"edge 'x0' y goes from 0 to 1: .* Symmetry\('x0', 'x'\)"),
+    ([fx.Symmetry("x0"), fx.Symmetry("y0")], r"along the edge 'y0' x goes from 0 to 1: must be Symmetry\('y0', 'y'\)"),
+    ([fx.Symmetry("x0"), fx.Symmetry("rim", "y")], "must be a straight edge along x or y; another edge can be Clamped"),
+])
+def test_a_plane_of_symmetry_is_normal_to_its_axis(supports, words):
+    with pytest.raises(fx.InputError, match=words):
+        disc(supports=[fx.SimplySupported("rim"), *supports])
+
+
+def test_an_edge_may_slide_in_the_plane_of_the_sheet():
+    """An edge of any shape lies in the plane z = 0, and the default axis is x."""
+    scene = disc(supports=[fx.Symmetry("rim", "z"), fx.Symmetry("x0"), fx.Symmetry("y0", "y")],
+                 contacts=[fx.Contact("top", fx.tools.revolved(fx.tools.sphere(radius=2.0, z=1.0)))])
+    assert scene.symmetry_factor == 4 and fx.check(scene).healthy
+
+
+@pytest.mark.parametrize("kind, scale, words", [
+    ("box", 0.8, "the mould is wider than the sheet: its mouth is 0.205 mm or more away"), ("box", 0.96, None),
+    ("box", 1.0, None), ("box", 1.3, None), ("box", 16.0, "is 0.148 times as wide as the sheet: are"),
+    ("file", 0.8, "the mould is wider than the sheet"), ("file", 1.0, None), ("file", 1.3, None),
+    ("file", 4.0, "hangs past the end .*pressure = 1 is more than the 0.0541 MPa")])
+def test_moulds_wider_or_narrower_than_the_sheet(moulds, kind, scale, words):
+    report = fx.check(tray(scale, moulds[kind]), targets=[fx.pressure(1.0)], units=fx.Units(length="mm", stress="MPa"))
+    if words is None:
+        assert report.healthy
+    else:
+        finding, = report.findings
+        assert finding.severity == "warning" and finding.about.startswith("Contact('bottom'")
+        assert re.search(words, finding.text), finding.text
+
+
+def test_a_sheet_is_blown_past_the_end_of_a_narrow_mould(moulds):
+    """Below the pressure of the finding the overhang stays a shallow blister; above it, it is the thinnest place."""
+    depth, wall = [], []
+    for pressure, found in ((0.15, False), (1.0, True)):
+        scene, target = tray(2.4, moulds["file"]), fx.pressure(pressure)
+        assert ("hangs past the end" in str(fx.check(scene, targets=[target]))) == found
+        walls = fx.trace(scene, until=target, progress=False).wall()
+        overhang = np.abs(walls.reference_points[:, 1]) > 3.2
+        depth.append(-walls.deformed_points[overhang, 2].min())
+        x = walls.middle[np.argmin(walls.ratio)]
+        wall.append((x[1] > 3.2, walls.ratio.min()))
+    assert depth[0] < 0.2 and depth[1] > 0.6
+    assert not wall[0][0] and wall[1][0] and wall[1][1] < 0.4 * wall[0][1]
