@@ -4,7 +4,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from ..findings import Finding, register
-from ..results.evaluate import creases, edges, resticking, snaps, tension, volume
+from ..results.evaluate import creases, edges, peeling, resticking, snaps, tension, volume
 from ..values.tolerances import NOTICEABLE
 
 
@@ -33,11 +33,15 @@ def contact(path: Any) -> Iterator[Finding]:
     """Report inaccurate contact in a `Path`; collective.
 
     The causes are penetration that changes tool forces, coarse elements at edges of tools, sticking points that
-    separate and stick again elsewhere, and faces that crease between sticking points.
+    separate and stick again elsewhere, tools off which the sheet is peeled, and faces that crease between sticking
+    points.
     """
+    moved = resticking.furthest(path)
     yield from path.admissibility.findings(path.last)
     yield from edges.findings(edges.coarsest(path, path.last))
-    yield from resticking.findings(resticking.furthest(path))
+    yield from resticking.findings(moved)
+    if moved and moved.shift > resticking.LARGE_SHIFT:
+        yield from peeling.findings(peeling.strongest(path.problem, path.segments[-1].states))
     yield from creases.findings(creases.deepest(path))
 
 

@@ -13,7 +13,7 @@ from ...findings import Finding, percent
 from ...ranks import gathered
 from ...values.tolerances import WALL_ERROR
 
-_LARGE_SHIFT = 0.1
+LARGE_SHIFT = 0.1
 """Shift from which the finding estimates no error: the neighbouring points moved too, so the strain changed less."""
 
 
@@ -91,7 +91,7 @@ def findings(item: Resticking | None) -> list[Finding]:
     """
     if item is None or item.shift < WALL_ERROR:
         return []
-    depend = f"depend on the steps, by up to {percent(item.shift)}" if item.shift < _LARGE_SHIFT else (
+    depend = f"depend on the steps, by up to {percent(item.shift)}" if item.shift < LARGE_SHIFT else (
         f"may depend on the steps (that point moved by {percent(item.shift)} of its tributary length)")
     count = f"{item.points} points that stuck" if item.points > 1 else "A point that stuck"
     return [Finding("warning", item.tool, f"{count} to {item.tool!r} lifted off and stuck again elsewhere, most near"

@@ -1,0 +1,71 @@
+"""Check of points that stick to a tool that hardly presses on them, as where air peels a sheet off a rough plug."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from mpi4py import MPI
+
+from ...findings import Finding, register
+from ...ranks import combined
+
+_LARGEST_FRICTION = 4.0
+"""Coefficient of friction of rubber, above which a tool has to be glued to hold the sheet."""
+
+
+class Peeling(NamedTuple):
+    """Tool from which a sticking sheet is peeled.
+
+    Attributes:
+        tool: name of the `Contact` with the tool, or of its boundary if it has no name.
+        ratio: sum of the tangential contact forces of all points over the sum of their normal forces, the largest of
+            all states.
+    """
+
+    tool: str
+    ratio: float
+
+
+def strongest(problem: Any, states: Sequence[Any]) -> Peeling | None:
+    """Return the tool with the largest ratio of tangential to normal contact forces; collective.
+
+    Args:
+        problem: the `Problem` of the states.
+        states: the states (`State`) to be examined.
+
+    Returns:
+        The tool; None if no sheet sticks to a tool from which it may separate.
+    """
+    found = []
+    for state in states:
+        with problem.state_context(state):
+            for face in problem.contacts:
+                if face.active and face.contact.sticks and face.contact.separates and not face.contact.lagged:
+                    tractions = face.tractions(state.x[:problem.n_owned], state.control)
+                    both = np.array([face.area @ np.abs(tractions.tangential), face.area @ tractions.normal])
+                    along, normal = combined(face.comm, both, MPI.SUM)
+                    if normal > 0:
+                        found.append(Peeling(face.contact.label, float(along / normal)))
+    return max(found, key=lambda item: item.ratio, default=None)
+
+
+def findings(item: Peeling | None) -> list[Finding]:
+    """Return a warning in a list if no real friction could hold the sheet, else []; item: result of `strongest`."""
+    if item is None or item.ratio < _LARGEST_FRICTION:
+        return []
+    return [Finding("warning", item.tool, f"the sheet is peeled off {item.tool!r}, to which it sticks: the tangential"
+                    f" contact forces come to {item.ratio:.2g} times the normal ones, on real tools to 0.05 to 1 times."
+                    f" Each point that separates moves suddenly; with friction, such as friction=1, the points slide"
+                    f" before they separate", "friction=1 in place of 'stick'")]
+
+
+@register("failure")
+def peeled(failure: Any) -> list[Finding]:
+    """Find a sheet that was peeled off a tool, to which it sticks, in the last state of a failed run; collective.
+
+    Args:
+        failure: the failed run, with its `problem` and its `last` state.
+    """
+    return findings(strongest(failure.problem, [failure.last])) if failure.last else []
