@@ -9,11 +9,10 @@ import numpy as np
 from ..findings import Finding, register
 from ..physics.loads import CentrifugalLoad, Gravity
 from ..values.table import Table
-from ..values.tolerances import ROUND_OFF
+from ..values.tolerances import LARGEST_FRICTION, ROUND_OFF
 from .mould_side import moulds, sign_towards
 from .sizes import LARGEST_LOAD, Body
 
-_LARGEST_FRICTION = 5.0         # coefficient of friction; rubber on dry steel has 1 to 4
 _LONGEST_IN_METRES = 5.0        # longest body whose length may be in metres
 _SHORTEST_IN_MICROMETRES = 1e3  # shortest body whose length may be in micrometres
 _SMALLEST_MODULUS = 1e-7        # shear modulus: 0.1 Pa in MPa
@@ -42,7 +41,7 @@ def friction(body: Body) -> Iterator[Finding]:
             continue
         table = getattr(contact.mu, "function", None) if contact.friction_by_temperature else None
         value = float(table.y.max()) if isinstance(table, Table) else contact.mu
-        if isinstance(value, float) and value > _LARGEST_FRICTION:
+        if isinstance(value, float) and value > LARGEST_FRICTION:
             yield Finding("warning", repr(contact),
                           f"its coefficient of friction is {value:.4g}: polymers on metal have 0.05 to 1, rubber up to"
                           f" 4. Is it a percentage? For a sheet that sticks use 'stick'")

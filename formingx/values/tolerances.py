@@ -41,3 +41,6 @@ MEASURED_ACCURACY = 0.01
 
 LARGE_ERROR = 0.05
 """Relative error, or relative change of a wall, from which a result is not to be used."""
+
+LARGEST_FRICTION = 5.0
+"""Largest plausible coefficient of friction: polymers on metal have 0.05 to 1, rubber on dry steel up to 4."""

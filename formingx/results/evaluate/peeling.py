@@ -10,9 +10,7 @@ from mpi4py import MPI
 
 from ...findings import Finding, register
 from ...ranks import combined
-
-_LARGEST_FRICTION = 4.0
-"""Coefficient of friction of rubber, above which a tool has to be glued to hold the sheet."""
+from ...values.tolerances import LARGEST_FRICTION
 
 
 class Peeling(NamedTuple):
@@ -53,7 +51,7 @@ def strongest(problem: Any, states: Sequence[Any]) -> Peeling | None:
 
 def findings(item: Peeling | None) -> list[Finding]:
     """Return a warning in a list if no real friction could hold the sheet, else []; item: result of `strongest`."""
-    if item is None or item.ratio < _LARGEST_FRICTION:
+    if item is None or item.ratio < LARGEST_FRICTION:
         return []
     return [Finding("warning", item.tool, f"the sheet is peeled off {item.tool!r}, to which it sticks: the tangential"
                     f" contact forces come to {item.ratio:.2g} times the normal ones, on real tools to 0.05 to 1 times."
