@@ -1,5 +1,7 @@
 """Thermal expansion: free and restrained cooling, strips of two layers, shrinkage of parts out of their mould."""
 
+import re
+
 import numpy as np
 import pytest
 from test_temperature import SHEET
@@ -145,8 +147,21 @@ def test_scenes_without_expansion_have_no_expansion_field():
     assert Problem(plain).forms.elastic_F is not None and Problem(plain).forms._free is None
 
 
+@pytest.mark.parametrize("law, words", [
+    (fx.ThermalExpansion(linear=2e-4, stress_free=HOT), None),
+    (fx.ThermalExpansion(specific_volume=fx.table({20: 0.8, 150: 1.0}), stress_free=HOT), None),
+    (fx.ThermalExpansion(specific_volume=fx.table({20: 0.95, 150: 1.02e-3}), stress_free=HOT),      # cm3/g and m3/kg
+     "from 150 to 20 degrees its lengths change by a factor of 9.77: .* volumes in one unit"),
+    (fx.ThermalExpansion(linear=2e-3, stress_free=HOT), "change by a factor of 0.74")])
+def test_implausible_changes_of_length_are_found(law, words):
+    found = str(fx.check(disc(20.0, expansion=law, loads=[fx.Pressure("bottom")])))
+    assert re.search(words or "no fault was found", found), found
+
+
 @pytest.mark.parametrize("make, words", [
     (lambda: fx.ThermalExpansion(stress_free=20), "give linear"),
+    (lambda: fx.ThermalExpansion(linear=70, stress_free=20), "must be at most 0.01: polymers .* in 1e-6/K is 7e-05"),
+    (lambda: fx.ThermalExpansion(linear=-0.011, stress_free=20), "must be at most 0.01"),
     (lambda: fx.ThermalExpansion(linear=1e-4, specific_volume=fx.table({0: 1, 1: 2}), stress_free=20), "give linear"),
     (lambda: fx.ThermalExpansion(specific_volume=1.02, stress_free=20), r"must be table\(\{T: v"),
     (lambda: fx.ThermalExpansion(specific_volume=fx.table({30: 1, 50: 2}), stress_free=20), "must be from 30 to 50"),

@@ -9,9 +9,11 @@ from ...errors import InputError
 from ...findings import Finding, percent, register
 from ...materials.constants import OfTemperature
 from ...materials.solidification import Solidification
+from ...ranks import gathered
 from ...values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 from ...values.tolerances import MEASURED_ACCURACY
 from .cooling_history import CoolingHistory
+from .expansion import ThermalExpansion
 from .layers import graded, height_at
 from .run import checked_materials, implausible_diffusivities
 
@@ -176,6 +178,32 @@ def implausible_units(body: Any) -> Iterator[Finding]:
                           f" mm and K")
     for text in implausible_diffusivities(materials, body.length):
         yield Finding("warning", "heat", text)
+
+
+@register("start")
+def implausible_expansion(body: Any) -> Iterator[Finding]:
+    """Find lengths that change by more than 20 % between the stress-free temperature and a temperature of the body.
+
+    Args:
+        body: the examined body, with its `scene`.
+
+    Yields:
+        A warning for each layer with such a change.
+    """
+    scene = body.scene
+    if not scene.expansion:
+        return
+    T = gathered(scene.mesh.comm, scene.temperature.T.x.array)
+    ends = [T.min(), T.max(), *(scene.heat.extremes(scene) if scene.heat is not None else ())]
+    for layer, law in scene.expansion.items():
+        if not isinstance(law, ThermalExpansion):
+            continue
+        found = {end: float(law.stretch(end, clamped=True)) for end in ends if np.isfinite(end)}
+        end = max(found, key=lambda T: abs(np.log(found[T])))
+        if not 0.8 < found[end] < 1.2:
+            yield Finding("warning", f"expansion of {layer!r}", f"from {law.stress_free:.4g} to {end:.4g} degrees its"
+                          f" lengths change by a factor of {found[end]:.3g}: polymers change by at most 0.1. Are all"
+                          f" volumes in one unit, and all temperatures, too?")
 
 
 @register("start")

@@ -19,12 +19,12 @@ class ThermalExpansion:
               J_T = [1 + a (T - T_0)]^3 \;\text{ or }\; J_T = \frac{v(T)}{v(T_0)}
 
     Args:
-        linear: coefficient a of linear expansion, 1/degree.
+        linear: coefficient a of linear expansion, 1/degree, at most 0.01; polymers have 5e-5 to 2e-4.
         specific_volume: v(T) instead, in any unit, a `table` or the result of `of_temperature`.
         stress_free: temperature T_0 at which the mesh is stress-free.
 
     Raises:
-        InputError: neither or both laws are given, or a volume is not positive.
+        InputError: neither or both laws are given, a coefficient is above 0.01 per degree, or a volume is not positive.
 
     >>> float(fx.ThermalExpansion(linear=1e-4, stress_free=120.0).stretch(20.0).round(6))
     0.99
@@ -35,6 +35,10 @@ class ThermalExpansion:
             raise InputError("ThermalExpansion: give linear=..., a number, or specific_volume=..., by temperature")
         self.stress_free = finite("ThermalExpansion: stress_free", stress_free)
         self.linear = None if linear is None else finite("ThermalExpansion: linear", linear)
+        if self.linear is not None and abs(self.linear) > 0.01:
+            raise InputError(f"ThermalExpansion: linear = {linear!r} per degree: must be at most 0.01: polymers have"
+                             f" 5e-5 to 2e-4 per degree, metals 1e-5 to 3e-5; {linear!r} in 1e-6/K is"
+                             f" {1e-6 * self.linear:.3g}")
         self.specific_volume: Any = varying(specific_volume)
         if linear is None and not isinstance(self.specific_volume, FunctionOfTemperature):
             raise InputError(f"ThermalExpansion: specific_volume = {specific_volume!r}: must be table({{T: v, ...}}) or"

@@ -1,4 +1,5 @@
-"""Checks of sheets in three dimensions: planes of symmetry, and moulds that are wider or narrower than the sheet."""
+"""Checks of sheets in three dimensions: planes of symmetry, size of triangles, moulds wider or narrower than the sheet.
+"""
 
 import re
 
@@ -40,7 +41,7 @@ def test_a_plane_of_symmetry_is_normal_to_its_axis(supports, words):
 def test_an_edge_may_slide_in_the_plane_of_the_sheet():
     """An edge of any shape lies in the plane z = 0, and the default axis is x."""
     scene = disc(supports=[fx.Symmetry("rim", "z"), fx.Symmetry("x0"), fx.Symmetry("y0", "y")],
-                 contacts=[fx.Contact("top", fx.tools.revolved(fx.tools.sphere(radius=2.0, z=1.0)))])
+                 contacts=[fx.Contact("top", fx.tools.revolved(fx.tools.sphere(radius=2.0, z=0.0)))])
     assert scene.symmetry_factor == 4 and fx.check(scene).healthy
 
 
@@ -72,3 +73,15 @@ def test_a_sheet_is_blown_past_the_end_of_a_narrow_mould(moulds):
         wall.append((x[1] > 3.2, walls.ratio.min()))
     assert depth[0] < 0.2 and depth[1] > 0.6
     assert not wall[0][0] and wall[1][0] and wall[1][1] < 0.4 * wall[0][1]
+
+
+@pytest.mark.parametrize("size, error, words", [
+    (0.3, 3e-4, None), (0.5, 0.041, "edges of triangles are up to 0.579 mm long, and the middle of the sheet is 1 mm"),
+    (200.0, 0.117, r"up to 1 mm long.*size=0.1\), or adapt_mesh")])
+def test_triangles_too_large_for_a_sheet(size, error, words):
+    """Errors of the pressure of a blister 0.6 high; the pressure on triangles of size 0.05 is 0.0482505."""
+    scene, target = disc(size), fx.displacement(0.6, at=(0.0, 0.0), component="z")
+    pressure = fx.trace(scene, until=target, progress=False).last.measures["pressure"]
+    assert abs(pressure / 0.0482505 - 1) == pytest.approx(error, rel=0.05)
+    found = str(fx.check(scene, units=fx.Units(length="mm")))
+    assert re.search(words or "no fault was found", found)
