@@ -232,6 +232,25 @@ def test_a_warning_names_the_end_of_a_contact(caplog):
     assert errors[1] > 0.8 * errors[0] and errors[2] < 0.7 * errors[0], errors
 
 
+def test_a_face_that_bridges_a_fillet_between_its_nodes_counts_as_touching():
+    """All nodes of a sheet touch a cup whose lip has a small fillet; elements half as long through the wall agree."""
+    mould = fx.tools.cup(radius=34.0, depth=14.0, mouth=1.0, fillet=8.0, lip=3.0, draft=5.0)
+    heat = fx.Cooling(fx.ThermalProperties(conductivity=0.2e-3, density=1.05e-3, heat_capacity=1.8), unit="C",
+                      tools={"mould": (0.5e-3, 20.0)})
+    found = []
+    for rows in 3, 6:
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.0, elements=(24, rows)), temperature=150.0,
+                         materials=fx.NeoHookean(c10=0.05), heat=heat, loads=[fx.Pressure("bottom", name="air")],
+                         supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                         contacts=[fx.Contact("top", mould, "stick", name="mould")])
+        path = fx.Process(scene).run([fx.Stage("blow", control="air", until=fx.pressure(0.15), duration=1.0),
+                                      fx.Stage("hold", duration=2.0)], progress=False)
+        found.append(path.temperature([[R, Z] for R in (0.0, 10.0, 20.0, 32.1, 38.0) for Z in (0.0, 0.5, 1.0)]))
+        error, = path.problem.histories[-1].errors_in_space([path.last])
+        assert error < 2.0                                       # of 130
+    assert np.abs(found[0] - found[1]).max() < 2.0
+
+
 @pytest.mark.parametrize("change, message", [
     ({}, None), ({"conductance": 500.0}, "conductance 500 is 2.5e.06 times conductivity over thickness"),
     ({"density": 1.05e-9}, "the diffusivity, .* is 1.06e.05, and the body 20 long"),

@@ -117,7 +117,13 @@ class CoolingHistory:
                     self._body.power = 0.0                  # as in `finer`, which has none
                     for body, touching in ((self._body, self._contacts), (finer, tool_contacts)):
                         _set_conductances(body, touching, state.control)
-                        body.update()
+                    for (touch, *_), (cubic, _, conductance) in zip(self._contacts, tool_contacts, strict=True):
+                        touching = estimator.contact_fraction(touch, cubic)
+                        cubic.conductance[np.isclose(touching, 0)] = 0.0
+                        inside = np.isclose(touching, 1)
+                        cubic.conductance[inside] = conductance[inside]
+                    self._body.update()
+                    finer.update()
                     error, place = estimator.largest(self._state, self._time)
                     found.append((error, self._contact_end(place)))
         finally:

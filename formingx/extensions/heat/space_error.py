@@ -55,6 +55,23 @@ class SpaceError:
         rows = gathered(body.comm, own[np.argsort(own[:, 0])[-1:]])
         return error, rows[np.argmax(rows[:, 0]), 1:3]
 
+    def contact_fraction(self, touch: HeatContact, finer: HeatContact) -> np.ndarray:
+        """Interpolate the contact of the nodes of the quadratic elements to the k contact nodes of the cubic elements.
+
+        The run takes a facet between nodes in contact as touching, even if its middle bridges a concave tool.
+
+        Args:
+            touch: contact with the tool, of the quadratic elements, with its present conductances.
+            finer: the same contact, of the cubic elements.
+
+        Returns:
+            1 on facets whose nodes all touch, 0 where none of them touches, other values at the end of a contact, shape
+            (k,).
+        """
+        values = np.zeros(len(self._body.points))
+        values[touch.dofs] = touch.conductance > 0
+        return self._in_cubic_space(values)[finer.dofs]
+
     def destroy(self) -> None:
         """Free the PETSc objects of `finer` (collective)."""
         self._finer.destroy()
