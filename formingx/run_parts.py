@@ -5,20 +5,21 @@ from __future__ import annotations
 import contextlib
 import copy
 import logging
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
-from .errors import ConvergenceError, InputError, Interrupted, check_name, check_type
+from .errors import ConvergenceError, InputError, Interrupted, check_name, check_type, file_path
 from .findings import Finding, log_findings
 from .measures.columns import Measure
 from .problem.problem import Problem
 from .results.files.checkpoint import Checkpoint, holds_states, read
+from .results.files.checkpoint_stages import check_stages, write_stages
 from .results.path import Path
 from .run_hooks import adaptation
 from .scene.scene import Scene
 from .solve.arc_length import Curve
 from .solve.record import Record
-from .solve.stage import Stage
+from .solve.stage import Plan, Stage
 from .solve.state import State
 
 log = logging.getLogger("formingx")
@@ -118,20 +119,24 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
     return Path(record, timed=timed, columns=columns, other=start if isinstance(start, Path) else None)
 
 
-def write_checkpoints(path: Path, checkpoint: Any) -> None:
+def write_checkpoints(path: Path, checkpoint: Any, plans: Sequence[Plan] = ()) -> None:
     """Register functions that write a checkpoint after each step and at the end of a run.
 
     Args:
         path: path of the run.
         checkpoint: folder of the checkpoint, or None for no checkpoint.
+        plans: plans of the stages of a process.
     """
     if checkpoint is not None:
         writer = Checkpoint(checkpoint, path)
+        if plans:
+            write_stages(writer.folder, plans, path.problem.comm)
         path.record.hooks.on_step.append(writer.write)
         path.record.hooks.on_end.append(writer.end)
 
 
-def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: Any) -> Any:
+def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: Any,
+               plans: Sequence[Plan] = ()) -> Any:
     """Return the path that a run continues: `start`, or with `resume` the path in the checkpoint, or None.
 
     Args:
@@ -140,15 +145,23 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
         checkpoint: argument of the calling function, a folder or None.
         scene: the scene.
         start: argument of the calling function, a path or None.
+        plans: plans of the stages of a process.
 
     Raises:
-        InputError: `resume` is given together with `start`, or without a checkpoint.
+        InputError: `resume` is given together with `start`, or without a checkpoint, or the checkpoint is of other
+            stages.
     """
     if not resume:
         return start
     if checkpoint is None or start is not None:
         raise InputError(f"{caller}: resume=True: give a checkpoint to continue from, and no start")
-    return Path(read(checkpoint, scene)) if holds_states(checkpoint, scene.mesh.comm) else None
+    if not holds_states(checkpoint, scene.mesh.comm):
+        return None
+    path = Path(read(checkpoint, scene))
+    if plans:
+        check_stages(file_path("checkpoint", checkpoint), plans, path.last.setting["stage"], path.last.time,
+                     scene.mesh.comm)
+    return path
 
 
 @contextlib.contextmanager

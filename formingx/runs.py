@@ -270,7 +270,7 @@ class Process:
         if isinstance(start, Path) and start.scene is not self.scene:
             raise InputError("Process: start: must be a path of this very scene: fx.load(folder, scene), or what run"
                              " gave back")
-        start = first_path("Process", resume, checkpoint, self.scene, start)
+        start = first_path("Process", resume, checkpoint, self.scene, start, plans)
         tolerances = tolerances or Tolerances()
         with run_errors(checkpoint) as register:
             problem = start.problem if isinstance(start, Path) else Problem(self.scene)
@@ -279,7 +279,7 @@ class Process:
             timed = any(stage.timed for stage in stages)
             found = before_run(self.scene, stages=stages)
             path = register(new_path(Curve(problem, tolerances), start, record, allow_inadmissible, found, timed))
-            write_checkpoints(path, checkpoint)
+            write_checkpoints(path, checkpoint, plans)
             max_steps = None if max_steps is None else count("Process: max_steps", max_steps)
 
             def part() -> None:

@@ -118,9 +118,9 @@ class CoolingHistory:
                     for body, touching in ((self._body, self._contacts), (finer, tool_contacts)):
                         _set_conductances(body, touching, state.control)
                     for (touch, *_), (cubic, _, conductance) in zip(self._contacts, tool_contacts, strict=True):
-                        touching = estimator.contact_fraction(touch, cubic)
-                        cubic.conductance[np.isclose(touching, 0)] = 0.0
-                        inside = np.isclose(touching, 1)
+                        fraction = estimator.contact_fraction(touch, cubic)
+                        cubic.conductance[np.isclose(fraction, 0)] = 0.0
+                        inside = np.isclose(fraction, 1)
                         cubic.conductance[inside] = conductance[inside]
                     self._body.update()
                     finer.update()

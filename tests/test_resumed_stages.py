@@ -1,0 +1,54 @@
+"""A process that resumes must have the stages by which the states in its checkpoint were made."""
+
+import pytest
+
+import formingx as fx
+
+
+def scene():
+    """A sheet that relaxes, under air, with a ball above it."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=20.0, thickness=0.5, elements=(6, 1)),
+                    materials=fx.Viscoelastic(fx.NeoHookean(c10=0.3), [(0.3, 1.0)]),
+                    supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                    loads=[fx.Pressure("bottom", name="air")],
+                    contacts=[fx.Contact("top", fx.tools.sphere(radius=9.0, z=2.5), "none", direction=(0, -1),
+                                         name="ball")])
+
+
+def stages(speed=0.02, pressure=0.01, table=((1, 0), (3, 5.0)), **more):
+    return [fx.Stage("air", control="air", until=fx.pressure(pressure), speed=speed, **more),
+            fx.Stage("ball", amplitudes={"ball": table})]
+
+
+def resumed(given, folder):
+    return fx.Process(scene()).run(given, accuracy="draft", checkpoint=folder, resume=True, progress=False)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("run") / "run"
+    resumed(stages(), folder)
+    return folder
+
+
+@pytest.mark.parametrize("change, message", [
+    ({"speed": 0.01}, "stage 'air': speed = 0.02 there, 0.01 here"),
+    ({"pressure": 0.02}, "stage 'air': until = 'pressure 0.01' there, 'pressure 0.02' here"),
+    ({"inactive": ["ball"]}, "stage 'air': inactive"),
+    ({"table": [(1, 0), (3, 4.0)]}, "stage 'ball': the amplitudes differ before the process time 3"),
+])
+def test_other_stages_are_refused(change, message, folder):
+    with pytest.raises(fx.InputError, match=message):
+        resumed(stages(**change), folder)
+
+
+def test_fewer_stages_are_refused(folder):
+    with pytest.raises(fx.InputError, match="its last state is of stage 2, 'ball', but the process has 1 now"):
+        resumed(stages()[:1], folder)
+
+
+def test_the_last_stage_continues_to_another_end(folder):
+    assert resumed(stages(), folder).last.time == pytest.approx(3.0)
+    longer = [(1, 0), (3, 5.0), (4, 5.0)]
+    path = resumed([*stages(table=longer), fx.Stage("hold", duration=1.0)], folder)
+    assert path.last.time == pytest.approx(5.0) and path["ball_travel"][-1] == pytest.approx(5.0)
