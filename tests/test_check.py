@@ -25,11 +25,19 @@ def formed(elements=(40, 1), tool=None, **contact):
                    contacts=[fx.Contact("top", tool or fx.tools.cup(fillet=0.1, **CUP), **contact)])
 
 
-def pushed(moves=(0, -1)):
+def pressed(friction, tool=None, **contact):
+    """A block under a plate that moves down, with a pressure on its side."""
+    return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(8, 8)), materials=fx.NeoHookean(c10=1.0),
+                    supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")], loads=[fx.Pressure("rim", 0.1)],
+                    contacts=[fx.Contact("top", tool or fx.tools.plane(1.0), friction, direction=(0, -1), name="press",
+                                         **contact)])
+
+
+def pushed(moves=(0, -1), friction="stick"):
     """A sheet under a ball that moves down."""
     return fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(40, 1)), materials=fx.NeoHookean(c10=2.0),
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
-                    contacts=[fx.Contact("top", fx.tools.sphere(radius=0.5).moved(z=0.582), direction=moves)])
+                    contacts=[fx.Contact("top", fx.tools.sphere(radius=0.5).moved(z=0.582), friction, direction=moves)])
 
 
 def pot(c10=0.4, pressure=0.09, moves=(0, 1), travel=22.0, mould=None, plug_at=0.0, material=None):
@@ -263,6 +271,9 @@ def test_each_fault_of_a_scene_has_its_finding(make, targets, severity, words):
     (lambda: treloar(), fx.travel(1.0), "has no travel"),
     (lambda: treloar(support=fx.Clamped("rim")), fx.displacement(0.1, at=(1.25, 0.041)), "Clamped.* holds"),
     (lambda: pushed(), fx.travel(-0.1), "the travel is negative"),
+    (lambda: pushed(), fx.force(-0.05), "nothing else loads the flat body, which pushes it back"),
+    (lambda: pressed(0.3), fx.force(-0.05), "can only push"),
+    (lambda: pressed("stick"), fx.force(-0.05, of="press"), "can only push"),
     (lambda: thick(2, materials=fx.Gent(mu=1.0, Jm=10.0)), fx.pole_stretch(3.0), "must be less than 2.54"),
 ])
 def test_targets_that_cannot_be_met(make, target, words):
@@ -275,6 +286,20 @@ def test_targets_that_cannot_be_met(make, target, words):
     other = fx.pole_height(0.1) if scene.driven.quantity == "pressure" else fx.travel(0.1)
     with pytest.raises(fx.InputError, match=words):
         fx.trace(scene, until=other, intermediate=[target], progress=False)
+
+
+@pytest.mark.parametrize("friction", [0.3, "stick"])
+def test_a_tool_with_friction_on_a_flat_sheet_alone_is_pushed_back(friction):
+    """Its force grows with its travel, and never falls below 0."""
+    scene = pushed(friction=friction)
+    path = fx.trace(scene, until=fx.travel(1.2), progress=False)
+    assert np.all(np.diff(path["tool_force"]) >= 0) and path["tool_force"][-1] > 0.1
+
+
+@pytest.mark.parametrize("make", [lambda: pressed(0.3, fx.tools.cylinder(radius=0.5, z=1.0, fillet=0.3)),
+                                  lambda: pressed("stick", separates=False)])
+def test_a_tool_may_be_pulled_where_another_load_or_a_bond_pulls(make):
+    assert "must not be negative" not in str(fx.check(make(), targets=[fx.force(-0.05)]))
 
 
 def test_a_stage_refuses_targets_that_cannot_be_met():

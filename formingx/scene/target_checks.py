@@ -9,6 +9,7 @@ from ..errors import InputError
 from ..mesh.nodes import SAME_PLACE
 from ..mesh.triangles import Triangles
 from ..physics.supports import Constrained
+from ..tools.pieces import Line
 from ..values.tolerances import ROUND_OFF
 from .scene import Scene
 
@@ -60,9 +61,14 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
             return f"the run drives {driven!r}, which has no {name}"
         if value < 0 and driven in scene.contacts and driven.separates:
             return f"the travel is negative: {driven!r} would move away from the body"
-    if inactive is None and name == "force" and value < 0 and driven in scene.contacts and driven.separates \
-            and not driven.friction_by_temperature and driven.mu == 0:
-        return f"{driven!r} can only push: the force must not be negative"
+    if inactive is None and value < 0 and driven in scene.contacts and driven.separates \
+            and name in ("force", f"{driven.name}_force"):
+        if not driven.friction_by_temperature and driven.mu == 0 or _is_plate(driven):
+            return f"{driven!r} can only push: the force must not be negative"
+        if _meets_flat_sheet_alone(scene, driven):
+            return (f"{driven!r} comes from outside and nothing else loads the flat body, which pushes it back all the"
+                    f" way: the force must not be negative. It pulls only as a tool that is withdrawn, in a stage of a"
+                    f" Process")
     if name.startswith("u_") and "_at_" in name and value != 0:
         found = _constraining_support(scene, name, [t for t in active if t in scene.supports])
         if found is not None:
@@ -103,6 +109,30 @@ def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
     if ROUND_OFF * abs(value) <= unit:                       # beyond it the unit is round-off of the value
         return None
     return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g} (are the units right?)"
+
+
+def _is_plate(contact: Any) -> bool:
+    """Return True if a tool is a plane normal to its direction: friction on it has no component along the direction."""
+    pieces: tuple[Any, ...] = getattr(getattr(contact.tool, "profile", contact.tool), "pieces", ())
+    if len(pieces) != 1 or not isinstance(pieces[0], Line):
+        return False
+    a, b = pieces[0].ends
+    return bool(a[1] == b[1]) and not any(contact.direction[:-1])
+
+
+def _meets_flat_sheet_alone(scene: Scene, contact: Any) -> bool:
+    """Return True if a tool that moves along Z is the only load of a flat sheet without a hole.
+
+    The sheet is then free of stress at the beginning, and resists the tool at each travel.
+    """
+    tool = scene.same_tool(scene.items.index(contact))
+    others = [item for i, item in enumerate(scene.items) if item.driven and i not in tool]
+    if scene.loads or others or scene.heat is not None or scene.expansion or scene.state_transfer is not None:
+        return False
+    face = scene.mesh.nodes_of(contact.on)
+    near = SAME_PLACE * max(scene.extent)
+    hole = scene.kinematics.components == 2 and face[:, 0].min() > near
+    return np.ptp(face[:, -1]) < near and not hole and not any(contact.direction[:-1])
 
 
 def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
