@@ -114,7 +114,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     max_steps = None if max_steps is None else count("trace: max_steps", max_steps)
     check_name("trace: at_limit_point =", at_limit_point, AT_LIMIT_POINT)
     scene.only_driven("trace")
-    target_checks.check(scene, [until, *intermediate])
+    target_checks.check(scene, [until, *intermediate], continues=start is not None)
     clearance.check_target(scene, until)
     if start is not None and (not isinstance(start, Path) or start.scene is not scene or not start.states):
         raise InputError("trace: start: must be a path of this very scene: fx.load(folder, scene), or what trace gave"

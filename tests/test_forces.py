@@ -7,10 +7,10 @@ from scipy.optimize import brentq
 import formingx as fx
 
 
-def pushed(radius=15.0, friction="none"):
+def pushed(radius=15.0, friction="none", loads=()):
     """A clamped sheet under a ball."""
     return fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)), materials=fx.NeoHookean(c10=0.4),
-                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                    supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=loads,
                     contacts=[fx.Contact("top", fx.tools.sphere(radius=radius, z=1.2), friction, direction=(0, -1))])
 
 
@@ -61,5 +61,14 @@ def test_a_disc_pulled_at_its_rim(force):
 def test_a_ball_without_friction_never_pulls():
     with pytest.raises(fx.InputError, match="can only push"):
         fx.trace(pushed(), until=fx.force(-1.0))
+
+
+def test_a_rough_ball_pulls_only_where_it_is_withdrawn_or_another_load_acts():
+    """A run that continues another, and a run with a pressure, try it."""
+    with pytest.raises(fx.InputError, match="which pushes it back"):
+        fx.trace(pushed(friction=0.1), until=fx.force(-1.0))
     with pytest.raises(fx.ConvergenceError, match="beyond any process"):
-        fx.trace(pushed(friction=0.1), until=fx.force(-1.0), progress=False)
+        fx.trace(pushed(friction=0.1, loads=[fx.Pressure("bottom", 0.0)]), until=fx.force(-1.0), progress=False)
+    path = fx.trace(scene := pushed(friction=0.1), until=fx.force(5.0), progress=False)
+    with pytest.raises(fx.ConvergenceError):
+        fx.trace(scene, until=fx.force(-1.0), start=path, progress=False)

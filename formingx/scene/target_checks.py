@@ -16,7 +16,8 @@ from .scene import Scene
 _GRID_SQUARES = 200         # number of squares along a mould's larger side
 
 
-def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None) -> None:
+def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None,
+          continues: bool = False) -> None:
     """Check that no target of a run contradicts the scene, before anything is solved (`unreachable`).
 
     Args:
@@ -24,17 +25,19 @@ def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None
         targets: the targets, with `name` and `value`, see `formingx.measures.targets`.
         inactive: numbers in `Scene.items` of the items that a stage leaves out. None: the target is for a run from the
             unloaded state with one control (`trace`).
+        continues: True if the run continues another one, and may withdraw a tool.
 
     Raises:
         InputError: a target cannot be reached.
     """
     for target in targets:
-        why = unreachable(scene, target, inactive)
+        why = unreachable(scene, target, inactive, continues)
         if why is not None:
             raise InputError(f"{target}: {why}")
 
 
-def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = None) -> str | None:
+def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = None,
+                continues: bool = False) -> str | None:
     """Return the reason why no run of a scene can reach a target.
 
     For example a pole stretch may exceed the limit of the material, or a pole may lie inside a mould.
@@ -44,6 +47,7 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
         target: the target, with `name` and `value`.
         inactive: numbers in `Scene.items` of the items that a stage leaves out. None: the target is for a run from the
             unloaded state with one control (`trace`).
+        continues: True if the run continues another one, and may withdraw a tool.
 
     Returns:
         The reason as text; None if no reason is known.
@@ -65,10 +69,10 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
             and name in ("force", f"{driven.name}_force"):
         if not driven.friction_by_temperature and driven.mu == 0 or _is_plate(driven):
             return f"{driven!r} can only push: the force must not be negative"
-        if _meets_flat_sheet_alone(scene, driven):
+        if not continues and _meets_flat_sheet_alone(scene, driven):
             return (f"{driven!r} comes from outside and nothing else loads the flat body, which pushes it back all the"
-                    f" way: the force must not be negative. It pulls only as a tool that is withdrawn, in a stage of a"
-                    f" Process")
+                    f" way: the force must not be negative. It pulls only where it is withdrawn: in a stage"
+                    f" of a Process, or with start=path")
     if name.startswith("u_") and "_at_" in name and value != 0:
         found = _constraining_support(scene, name, [t for t in active if t in scene.supports])
         if found is not None:
