@@ -67,6 +67,21 @@ def test_all_combinations(here, tmp_path):
         found.effects("h")
 
 
+def test_the_page_of_a_study_has_names_and_units(here, tmp_path):
+    found = fx.study(formula, {"x": [0, 1], "y": [1, 2]}, {"pole_height": f, "tool": "g"}, executor=here,
+                     progress=False, goal={"pole_height": "max", "tool": "min"})
+    found.report(tmp_path / "all.html", units=fx.Units(length="mm", stress="MPa"), labels={"x": "modulus, MPa"})
+    page = (tmp_path / "all.html").read_text()
+    assert "best (max pole height, min tool): modulus = 1, y = 2, pole height = " in page
+    for head in ("modulus, MPa", "y, mm", "pole height, mm", "tool", "run time, s", "failure"):
+        assert f">{head}</th>" in page, head
+    assert "pole_height" not in page and "seconds" not in page
+    assert found.plot_effects("pole_height", fx.Units(length="mm")).axes[0].get_ylabel() == "pole height, mm"
+    assert "pole_height" in str(found)
+    with pytest.raises(fx.InputError, match="labels: 'z' is not known"):
+        found.report(tmp_path / "all.html", labels={"z": "depth"})
+
+
 def test_main_effects_do_not_depend_on_failed_runs(here):
     """The best runs at y = 2 are missing: y = 2 is better by 3 all the same, as in each pair of runs."""
     found = run(here)

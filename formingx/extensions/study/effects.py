@@ -8,13 +8,15 @@ from ...figures import figure
 from ...results.show import page as pages
 
 
-def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measure: str) -> Any:
+def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measure: str,
+                 labels: dict[str, str]) -> Any:
     """Draw the main effects on a measure: one panel per variable, runs as dots, the mean at each level as a line.
 
     Args:
         runs: the successful runs (`StudyRun`).
         effects: result of `Study.effects` for this measure.
         measure: name of the measure.
+        labels: {name of a variable or measure: its label with unit}.
 
     Returns:
         The matplotlib figure.
@@ -23,12 +25,12 @@ def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measur
     for ax, (variable, levels) in zip([axes] if len(effects) == 1 else axes, effects.items()):
         ax.plot([run.values[variable] for run in runs], [run.measures[measure] for run in runs], ".", color="0.75")
         ax.plot(list(levels), list(levels.values()), "o-", color="C0")
-        ax.set(xlabel=variable.replace("_", " "), ylabel=measure.replace("_", " "))
+        ax.set(xlabel=labels[variable], ylabel=labels[measure])
         ax.locator_params("x", nbins=6)                     # or the numbers of a single level run into each other
     return drawing
 
 
-def pareto(runs: list[Any], front: list[Any], a: str, b: str) -> Any:
+def pareto(runs: list[Any], front: list[Any], a: str, b: str, labels: dict[str, str]) -> Any:
     """Draw two measures of all runs as dots, with the Pareto front as a line.
 
     Args:
@@ -36,6 +38,7 @@ def pareto(runs: list[Any], front: list[Any], a: str, b: str) -> Any:
         front: runs of the Pareto front, in order.
         a: name of the first measure.
         b: name of the second measure.
+        labels: {name of a variable or measure: its label with unit}.
 
     Returns:
         The matplotlib figure.
@@ -43,30 +46,35 @@ def pareto(runs: list[Any], front: list[Any], a: str, b: str) -> Any:
     drawing, axes = figure()
     axes.plot([run.measures[a] for run in runs], [run.measures[b] for run in runs], ".", color="0.75")
     axes.plot([run.measures[a] for run in front], [run.measures[b] for run in front], "o-", color="C3")
-    axes.set(xlabel=a.replace("_", " "), ylabel=b.replace("_", " "))
+    axes.set(xlabel=labels[a], ylabel=labels[b])
     return drawing
 
 
-def page(study: Any, title: str) -> str:
+def page(study: Any, title: str, labels: dict[str, str]) -> str:
     """Return the HTML page of `Study.report`: best run, main effects, Pareto fronts, all runs.
 
     Args:
         study: the `Study`.
         title: heading of the page.
+        labels: {name of a variable or measure: its label with unit}.
 
     Returns:
         HTML text.
     """
-    body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{pages.lines(str(study))}</p>"]
+    names = {name: label.rpartition(", ")[0] or label for name, label in labels.items()}
+    body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{pages.lines(study.text(names))}</p>"]
     if study.goal and study.successful:
         best = study.best
-        body += ["<h2>Best</h2>", pages.table(["", ""], [[k, pages.number(v)] for k, v in
+        body += ["<h2>Best</h2>", pages.table(["", ""], [[labels[k], pages.number(v)] for k, v in
                                                          {**best.values, **best.measures}.items()])]
     for measure in study.measures if study.successful else ():
-        caption = f"Main effects on {measure.replace('_', ' ')}: runs (dots), means at each level."
-        body.append(pages.figure(study.plot_effects(measure), caption))
+        caption = f"Main effects on {names[measure]}: runs (dots), means at each level."
+        body.append(pages.figure(main_effects(study.successful, study.effects(measure), measure, labels),
+                                 caption))
     for a, b in itertools.combinations(study.goal, 2) if study.successful else ():
-        body.append(pages.figure(study.plot_pareto(a, b), f"{a} and {b}: no run beats the red ones in both.", "small"))
-    head, columns = list(study.columns), list(study.columns.values())
-    rows = [[v if isinstance(v, str) else pages.number(v) for v in row] for row in zip(*columns)]
+        body.append(pages.figure(pareto(study.successful, study.pareto(a, b), a, b, labels),
+                                 f"{names[a]} and {names[b]}: no run beats the red ones in both.", "small"))
+    columns = study.columns
+    rows = [[v if isinstance(v, str) else pages.number(v) for v in row] for row in zip(*columns.values())]
+    head = [{**labels, "seconds": "run time, s", "error": "failure"}[name] for name in columns]
     return pages.page(title, [*body, "<h2>All runs</h2>", pages.table(head, rows)])

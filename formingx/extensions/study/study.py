@@ -27,12 +27,14 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, check_name, count, file_path
+from ...errors import InputError, check_name, check_type, count, file_path
 from ...results.files import replace
 from ...results.files.column_table import ColumnTable
+from ...units import NONE, Units
 from ...values.tolerances import NEGLIGIBLE
 from . import effects, stored_runs
-from .task import Measure, StudyRun, Task, as_text, check_importable, completed_runs, executor_context
+from .task import Measure, StudyRun, Task, check_importable, completed_runs, executor_context
+from .task import as_text as named
 from .variables import sets_of_values
 
 
@@ -124,37 +126,51 @@ class Study(ColumnTable):
         return {name: {level: float(value + sum(means) - mean) for level, value in zip(tried, part)}
                 for (name, tried), part, mean in zip(levels.items(), parts, means)}
 
-    def plot_effects(self, measure: str) -> Any:
+    def plot_effects(self, measure: str, units: Units = NONE) -> Any:
         """Draw the main effects on a measure, with every successful run as a dot.
 
         Args:
             measure: name of the measure.
+            units: units of the script, for the labels.
 
         Returns:
             The matplotlib figure.
         """
-        return effects.main_effects(self.successful, self.effects(measure), measure)
+        return effects.main_effects(self.successful, self.effects(measure), measure, self._labels(units))
 
-    def plot_pareto(self, a: str, b: str) -> Any:
+    def plot_pareto(self, a: str, b: str, units: Units = NONE) -> Any:
         """Draw two measures of all successful runs as dots, with the Pareto front as a line.
 
         Args:
             a: name of the first measure.
             b: name of the second measure.
+            units: units of the script, for the labels.
 
         Returns:
             The matplotlib figure.
         """
-        return effects.pareto(self.successful, self.pareto(a, b), a, b)
+        return effects.pareto(self.successful, self.pareto(a, b), a, b, self._labels(units))
 
-    def report(self, file: Any, title: str = "Study") -> None:
+    def report(self, file: Any, title: str = "Study", units: Units = NONE,
+               labels: Mapping[str, str] | None = None) -> None:
         """Write an HTML page with the best run, main effects, Pareto fronts of the goals, and all runs.
 
         Args:
             file: path of the HTML file.
             title: heading of the page.
+            units: units of the script, for the labels. The end of a name determines its unit, as in "rim_radius" or
+                "plug_force"; a measure that is a column has the unit of the column.
+            labels: {name of a variable or measure: another label, such as "modulus, MPa"}.
+
+        Raises:
+            InputError: a name in `labels` is unknown.
         """
-        replace(file, lambda stream: stream.write(effects.page(self, title)))
+        check_type("Study.report: units", units, Units, "a formingx.Units")
+        found = self._labels(units)
+        for name, label in dict(labels or {}).items():
+            check_name("Study.report: labels:", name, found)
+            found[name] = check_type("Study.report: label", label, str, "text")
+        replace(file, lambda stream: stream.write(effects.page(self, title, found)))
 
     def refine(self, evaluations: int = 30, within: Mapping[str, tuple[float, float]] | None = None,
                executor: futures.Executor | None = None) -> StudyRun:
@@ -202,18 +218,36 @@ class Study(ColumnTable):
         return self.best
 
     def __str__(self) -> str:
+        return self.text({name: name for name in (*self.variables, *self.measures)})
+
+    def text(self, names: Mapping[str, str]) -> str:
+        """Return a summary of the runs as text: their number, the best run, failures and warnings.
+
+        Args:
+            names: {name of a variable or measure: name in the text}.
+        """
+        def as_text(values: Mapping[str, float]) -> str:
+            """Return numbers with the names in the text."""
+            return named({names[name]: value for name, value in values.items()})
         failed = len(self.runs) - len(self.successful)
         lines = [f"{len(self.runs)} runs" + f", of which {failed} failed" * bool(failed)
                  + f", {sum(run.seconds for run in self.runs):.1f} s in all"]
         if self.goal and self.successful:
             shown = as_text({**self.best.values, **self.best.measures})
-            lines.append(f"best ({', '.join(f'{direction} {name}' for name, direction in self.goal.items())}): {shown}")
-            lines += self._edge_warnings()
+            lines.append(f"best ({', '.join(f'{direction} {names[name]}' for name, direction in self.goal.items())}):"
+                         f" {shown}")
+            lines += self._edge_warnings(names)
         lines += [f"failed: {as_text(run.values)}: {run.error.splitlines()[0]}" for run in self.runs if run.error]
         return "\n".join([*lines, *(f"warning: {as_text(run.values)}: {text}" for run in self.runs
                                     for text in run.warnings)])
 
-    def _edge_warnings(self) -> list[str]:
+    def _labels(self, units: Units) -> dict[str, str]:
+        """Return {name of a variable or measure: its label with unit}."""
+        columns = {name: found for name, found in self._task.measures.items() if isinstance(found, str)}
+        return {name: units.label(columns.get(name, name), name.replace("_", " "))
+                for name in (*self.variables, *self.measures)}
+
+    def _edge_warnings(self, names: Mapping[str, str]) -> list[str]:
         """Return a line of text for each variable whose value in the best run is the lowest or highest one tried."""
         found = []
         for name in self.variables:
@@ -221,8 +255,8 @@ class Study(ColumnTable):
             low, high, best = min(values), max(values), self.best.values[name]
             margin = NEGLIGIBLE * (high - low)
             if low < high and not low + margin < best < high - margin:
-                found.append(f"the best is at the edge of {name}, which was run from {low:g} to {high:g}: a better one"
-                             f" may lie {'below' if best <= low + margin else 'above'}")
+                found.append(f"the best is at the edge of {names[name]}, which was run from {low:g} to {high:g}: a"
+                             f" better one may lie {'below' if best <= low + margin else 'above'}")
         return found
 
     def _cost(self, run: StudyRun) -> float:
