@@ -1,5 +1,7 @@
 """Evaluation of runs: wall, part, filling, contact, forces, work; against closed forms and conservation laws."""
 
+import json
+
 import numpy as np
 import pytest
 from conftest import treloar
@@ -11,6 +13,9 @@ from formingx.contact import resultants
 from formingx.forms.probes import probe
 from formingx.io import csv_files
 from formingx.problem.problem import Problem
+from formingx.results.files.checkpoint_data import contents
+from formingx.results.show import interactive
+from formingx.results.show.report_data import of_checkpoint
 
 
 @pytest.fixture(scope="module")
@@ -291,3 +296,36 @@ def test_pole_stretch_is_that_of_the_fibre(kinematics, model):
     with path.problem.state_context(path.last) as problem:
         along = 1 + probe(problem, R).displacement(problem.x)[0, 0] / 1e-3
     assert path["pole_stretch"][-1] == pytest.approx(along, rel=2e-3) and along > 1.2
+
+
+def barrel(kinematics):
+    """Return the path of a block as high as its radius that is crushed between plates to which it is bonded."""
+    supports = [fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.Symmetry("top", "r"),
+                fx.PrescribedDisplacement("top", "z")]
+    block = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=1.0, elements=(8, 8)), supports=supports,
+                     materials=fx.NeoHookean(c10=1.0), kinematics=kinematics)
+    return fx.trace(block, until=fx.travel(-0.2), progress=False)
+
+
+@pytest.mark.parametrize("kinematics", [fx.Axisymmetric(), fx.PlaneStrain()])
+def test_the_outline_of_a_block_bulges_as_its_rim(kinematics, tmp_path):
+    """It encloses the volume of the block, by which a straight rim is off by 10 %; the report draws the same rim."""
+    path = barrel(kinematics)
+    profile, axisymmetric = path.profile(), kinematics.axisymmetric
+
+    def content(points):
+        a, b = points, np.roll(points, -1, axis=0)
+        (r, z), (s, y) = a.T, b.T
+        return abs(np.sum((y - z) * ((r * r + r * s + s * s) * np.pi / 3 if axisymmetric else (r + s) / 2)))
+    straight = content(np.vstack([profile.bottom, profile.top[::-1]]))
+    assert content(profile.outline) == pytest.approx(np.pi if axisymmetric else 1.0, rel=3e-3)
+    assert straight < 0.93 * content(profile.outline)
+    assert profile.end[[0, -1]] == pytest.approx(np.array([profile.bottom[-1], profile.top[-1]]), abs=1e-12)
+    assert profile.start[:, 0] == pytest.approx(0.0, abs=1e-12)
+    rows = profile.through_wall(np.linspace(0, 1, 5))
+    assert rows[[0, -1]] == pytest.approx(np.array([profile.bottom, profile.top]), abs=1e-12)
+    assert np.abs(rows[:, 0, 0]).max() < 1e-12 and rows[2, -1, 0] > rows[-1, -1, 0] + 0.1
+    path.save(tmp_path / "run")
+    drawn, = (run["sheet"] for run in json.loads(interactive.data(
+        [of_checkpoint(*contents(tmp_path / "run"))], ["run"], fx.Units()))["runs"])
+    np.testing.assert_allclose(np.array(drawn["end"][-1]).T, profile.end, atol=1e-4)

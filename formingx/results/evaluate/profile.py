@@ -9,10 +9,16 @@ import numpy as np
 
 from ...errors import InputError, finite
 from ...forms.probes import Probe, probe
+from ...mesh.nodes import SAME_PLACE
 from ...mesh.sizes import length_along
+from ...values.tolerances import PIECE_POINTS
 
 FACES = (("bottom", "top"), ("inner", "outer"))
 """Names of the boundaries that are the two faces of a sheet, or of the wall of a parison."""
+
+
+_EDGE_POINTS = (PIECE_POINTS + 1) // 2
+"""Number of points on the edge of a section through the wall, enough for eight curved edges of elements."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +33,9 @@ class Profile:
         reference_top: reference positions (R, Z) of the top points, shape (n, 2), length.
         bottom: deformed positions (r, z) of the bottom points, shape (n, 2), length.
         top: deformed positions (r, z) of the top points, shape (n, 2), length.
+        start: deformed positions of points through the wall at the first pair, from bottom to top, at equal distances
+            along the reference edge, shape (17, 2), length. None in checkpoints of earlier versions.
+        end: the same at the last pair, the rim.
 
     >>> wall = path.profile().thickness                                                   # from the pole to the rim
     >>> [round(float(h), 3) for h in (wall[0], wall[-1])]
@@ -37,6 +46,8 @@ class Profile:
     reference_top: np.ndarray
     bottom: np.ndarray
     top: np.ndarray
+    start: np.ndarray | None = None
+    end: np.ndarray | None = None
 
     @property
     def reference_radius(self) -> np.ndarray:
@@ -89,6 +100,45 @@ class Profile:
         """Arc length of the deformed middle line from the axis to each point, shape (n,), length."""
         return length_along(self.middle)
 
+    @property
+    def outline(self) -> np.ndarray:
+        """Deformed boundary of the section in order: bottom, end, top and start, shape (m, 2), length."""
+        start, end = (points if edge is None else edge[1:-1]
+                      for points, edge in ((self.bottom[:0], self.start), (self.bottom[:0], self.end)))
+        return np.vstack([self.bottom, end, self.top[::-1], start[::-1]])
+
+    @property
+    def end_weights(self) -> np.ndarray:
+        """Part of the bulge of the start and of the end that each pair of points shares, shape (2, n).
+
+        It decreases from 1 to 0 over twice the thickness, or over the whole length of a shorter body.
+        """
+        s = self.reference_length
+        reach = min(s[-1], 2 * float(self.original_thickness.max()))
+        return np.clip(1 - np.array([s, s[-1] - s]) / reach, 0.0, 1.0)
+
+    def through_wall(self, fractions: np.ndarray) -> np.ndarray:
+        """Return deformed positions between the faces, for drawing, shape (m, n, 2), length.
+
+        They lie on straight lines from bottom to top points. Near the two ends of the section they are displaced normal
+        to these lines, as much as the end bulges.
+
+        Args:
+            fractions: position between bottom (0) and top (1), shape (m,).
+        """
+        s = np.asarray(fractions)[:, None, None]
+        straight = (1 - s) * self.bottom + s * self.top
+        found = straight.copy()
+        for edge, k, weight in zip((self.start, self.end), (0, -1), self.end_weights):
+            if edge is not None:
+                chord = edge[-1] - edge[0]
+                along = (edge - edge[0]) @ chord / (chord @ chord)
+                rises = np.append(True, along[1:] > np.maximum.accumulate(along)[:-1])      # elsewhere it rolls over
+                rises = np.append(rises[:-1] & (along[:-1] < 1), True)
+                curve = np.column_stack([np.interp(fractions, along[rises], values) for values in edge[rises].T])
+                found += weight[:, None] * (curve - straight[:, k])[:, None]
+        return found
+
     def thickness_ratio_at(self, radius: float) -> float:
         """Return `thickness_ratio` at a reference radius, interpolated linearly between the bottom points.
 
@@ -139,11 +189,12 @@ class Profiles:
         """
         self._probe = faces = self._probe or self._make_probe()
         deformed = faces.points + faces.displacement_in(state)
-        n = len(faces.points) // 2
-        return Profile(faces.points[:n].copy(), faces.points[n:].copy(), deformed[:n], deformed[n:])
+        n = (len(faces.points) - 2 * _EDGE_POINTS) // 2
+        bottom, top, start, end = np.split(deformed, np.cumsum([n, n, _EDGE_POINTS]))
+        return Profile(faces.points[:n].copy(), faces.points[n:2 * n].copy(), bottom, top, start, end)
 
     def _make_probe(self) -> Probe:
-        """Return the `Probe` that evaluates displacements at the bottom points, then at the opposite top points.
+        """Return the `Probe` of the displacements at the bottom points, the top points, the start and the end.
 
         Raises:
             InputError: the mesh has no pair of faces, or the sheet is in three dimensions.
@@ -159,7 +210,30 @@ class Profiles:
         bottom, top = (mesh.line_of(name) for name in faces)
         if np.hypot(*(top - bottom[0]).T).argmin() > np.hypot(*(top - bottom[-1]).T).argmin():
             top = top[::-1]                                 # an open tube whose wall changes: see `Mesh.line_of`
-        return probe(self._problem, np.vstack([bottom, _opposite(bottom, top)]))
+        opposite = _opposite(bottom, top)
+        edges = [_edge_points(mesh, faces, bottom[k], opposite[k]) for k in (0, -1)]
+        return probe(self._problem, np.vstack([bottom, opposite, *edges]))
+
+
+def _edge_points(mesh: Any, faces: tuple[str, str], bottom: np.ndarray, top: np.ndarray) -> np.ndarray:
+    """Return points at equal distances along the edge of a section from its bottom to its top, shape (17, 2), length.
+
+    The edge is the boundary of the mesh, other than the two `faces`, that ends at the two points `bottom` and `top`,
+    shape (2,) each, length. If there is no such boundary, it is the straight line between them.
+    """
+    line = np.array([bottom, top])
+    for name in (name for name in mesh.boundaries if name not in faces):
+        try:
+            found = mesh.line_of(name)
+        except InputError:                                   # it is in several parts
+            continue
+        found = found if np.hypot(*(found[0] - bottom)) < np.hypot(*(found[-1] - bottom)) else found[::-1]
+        if np.hypot(*(found[[0, -1]] - line).T).max() < SAME_PLACE * np.hypot(*(top - bottom)):
+            line = refined(found)
+            break
+    length = length_along(line)
+    at = np.linspace(0, length[-1], _EDGE_POINTS)
+    return np.column_stack([np.interp(at, length, values) for values in line.T])
 
 
 def refined(line: np.ndarray, parts: int = 6) -> np.ndarray:

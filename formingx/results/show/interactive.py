@@ -84,8 +84,10 @@ def _sheet(record: ReportData, units: Units) -> dict[str, Any]:
 
     Returns:
         "from": "R" or "Z", the reference coordinate that names the m stations. "material": this coordinate of the
-        stations, shape (m,). "bottom", "top": deformed positions of the faces, shape (states, 2, m). "fields": {label
-        with unit: values, shape (states, m)} of the wall, the wall ratio, and all fields of the record.
+        stations, shape (m,). "bottom", "top": deformed positions of the faces, shape (states, 2, m). "start", "end":
+        deformed positions of the edges through the wall at the first and the last station, shape (states, 2, k), and
+        "weights": `Profile.end_weights` at the stations, shape (2, m). "fields": {label with unit: values, shape
+        (states, m)} of the wall, the wall ratio, and all fields of the record.
     """
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, FRAMES + 1)).round().astype(int))
@@ -102,7 +104,15 @@ def _sheet(record: ReportData, units: Units) -> dict[str, Any]:
     column = int(np.argmax(np.ptp(last.reference_bottom, axis=0)))          # of a parison: Z
     return {"from": "RZ"[column], "material": rounded(last.reference_bottom[stations, column]), "fields": fields,
             "bottom": [rounded(p.bottom[stations].T) for p in profiles],
-            "top": [rounded(p.top[stations].T) for p in profiles]}
+            "top": [rounded(p.top[stations].T) for p in profiles],
+            "start": [rounded(_edge(p, 0).T) for p in profiles], "end": [rounded(_edge(p, -1).T) for p in profiles],
+            "weights": rounded(last.end_weights[:, stations])}
+
+
+def _edge(profile: Any, k: int) -> np.ndarray:
+    """Return the deformed edge through the wall at the start (k = 0) or end (k = -1), shape (m, 2), length."""
+    edge = profile.end if k else profile.start
+    return np.array([profile.bottom[k], profile.top[k]]) if edge is None else edge
 
 
 def _label(record: ReportData, units: Units, key: str) -> str:

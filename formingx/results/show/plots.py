@@ -90,9 +90,10 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
     """
     import numpy as np
     from matplotlib.collections import PolyCollection
-    bottom, top = np.asarray(profile.bottom) * scale, np.asarray(profile.top) * scale
-    strips = np.stack([bottom[:-1], bottom[1:], top[1:], top[:-1]], 1)
+    rows = profile.through_wall(np.linspace(0, 1, 17)) * scale
+    strips = np.concatenate([rows[:, :-1], rows[::-1, 1:]]).swapaxes(0, 1)
     faces = (colours[1:] + colours[:-1]) / 2
+    axes.fill(*(profile.outline * scale).T, color=faces[-1], zorder=1.9)       # of an end that rolls over the face
     axes.add_collection(PolyCollection(list(strips), facecolors=faces, edgecolors=faces, linewidths=1.8, zorder=2))
 
 
@@ -106,7 +107,7 @@ def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
         mirrored: True to include the mirror images of the sheets at r = 0.
     """
     import numpy as np
-    points = np.vstack([side for profile in profiles for side in (profile.bottom, profile.top)])
+    points = np.vstack([profile.outline for profile in profiles])
     low, high = points.min(0), points.max(0)
     if mirrored:
         low[0] = -high[0]
@@ -115,7 +116,7 @@ def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
 
 
 def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
-    """Draw the section of a deformed sheet as an area between its two faces, in one colour.
+    """Draw the section of a deformed sheet as an area in one colour.
 
     Args:
         profile: the `Profile` of the sheet.
@@ -123,7 +124,6 @@ def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
         scale: factor by which r and z are multiplied.
         style: keyword arguments of matplotlib's `fill`.
     """
-    import numpy as np
-    points = scale * np.vstack([profile.bottom, profile.top[::-1]])
+    points = scale * profile.outline
     axes.fill(*points.T, **{"linewidth": 0.8, "edgecolor": style.get("color"), **style})
     axes.set_aspect("equal")

@@ -26,7 +26,7 @@ function frame(run, s, field) {
   const {k, j, f} = place(run, s), sheet = run.sheet || run.mesh, values = sheet.fields[field];
   const line = of => (sheet[of] ? sheet[of][k] : []).map((v, i) => mix(v, sheet[of][j][i], f));
   const between = (a, b) => f < 1 && a !== null && b !== null ? a + f * (b - a) : f < 1 ? a : b;
-  return {bottom: line("bottom"), top: line("top"), points: line("points"), values: mix(values[k], values[j], f),
+  return {bottom: line("bottom"), top: line("top"), start: line("start"), end: line("end"), points: line("points"), values: mix(values[k], values[j], f),
     moved: (sheet.tools || []).map(tool => between(tool.travel[k], tool.travel[j])),
     all: Object.fromEntries(Object.entries(sheet.fields).map(([name, v]) => [name, mix(v[k], v[j], f)])),
     numbers: Object.fromEntries(Object.entries(run.numbers).map(([n, v]) => [n, v[k] + f * (v[j] - v[k])])),
@@ -48,6 +48,18 @@ const maps = run => run.images.flatMap(([sr, sz, dr, dz]) => (run.axisymmetric ?
 const format = x => x === null || x === undefined ? "" : Number(x.toPrecision(4)).toString();
 const stated = (label, x) => { const [name, unit] = label.split(", "); return `${name} ${format(x)} ${unit || ""}`.trim(); };
 
+// The closed outline of a section along an axis; positions at a fraction s of the wall, bent near the ends like these.
+const around = (at, axis) => [...at.bottom[axis], ...at.end[axis].slice(1, -1), ...[...at.top[axis]].reverse(),
+  ...at.start[axis].slice(1, -1).reverse()];
+function through(run, at, axis, s) {
+  const bulge = ([r, z]) => {
+    const n = r.length - 1, dr = r[n] - r[0], dz = z[n] - z[0], along = r.map((v, k) => ((v - r[0]) * dr + (z[k] - z[0]) * dz) / (dr * dr + dz * dz));
+    const k = Math.max(along.findIndex(v => v >= s), 1), f = (s - along[k - 1]) / (along[k] - along[k - 1]), v = [r, z][axis];
+    return v[k - 1] + f * (v[k] - v[k - 1]) - v[0] - s * (v[n] - v[0]);
+  }, [near, far] = run.sheet.weights, first = bulge(at.start), other = bulge(at.end);
+  return mix(at.bottom[axis], at.top[axis], s).map((v, i) => v + near[i] * first + far[i] * other);
+}
+
 function sectionTraces(run, at, field, range) {
   const sides = maps(run), traces = [];
   run.tools.forEach((tool, i) => sides.forEach(([across, up]) => {
@@ -59,7 +71,7 @@ function sectionTraces(run, at, field, range) {
   }));
   sides.forEach(([across, up]) => traces.push({type: "scatter", mode: "lines", fill: "toself", fillcolor: "#30405a",
     line: {color: "#30405a", width: 0.5}, hoverinfo: "skip", showlegend: false,
-    x: across([...at.bottom[0], ...[...at.top[0]].reverse()]), y: up([...at.bottom[1], ...[...at.top[1]].reverse()])}));
+    x: across(around(at, 0)), y: up(around(at, 1))}));
   const [bottom, top] = [at.bottom, at.top], stations = bottom[0].length, size = Math.max(...box(run).map(([a, b]) => b - a));
   const wall = Math.max(...bottom[0].map((r, i) => Math.hypot(top[0][i] - r, top[1][i] - bottom[1][i])));
   const rows = Math.min(Math.max(Math.ceil(wall / (0.0125 * size)), 1), 20);                // of dots through the wall
@@ -68,7 +80,7 @@ function sectionTraces(run, at, field, range) {
   const dense = v => v.flatMap((a, i) => i + 1 < stations
     ? Array.from({length: parts}, (_, k) => a === null ? a : a + k / parts * ((v[i + 1] ?? a) - a)) : [a]);
   const all = list => Array.from({length: rows}, (_, k) => list((k + 0.5) / rows)).flat();
-  const [r, z] = [0, 1].map(axis => all(s => dense(mix(bottom[axis], top[axis], s))));
+  const [r, z] = [0, 1].map(axis => all(s => dense(through(run, at, axis, s))));
   sides.forEach(([across, up], n) => traces.push({type: "scatter", mode: "markers", showlegend: false, hovertemplate: "%{text}<extra></extra>",
     x: across(r), y: up(z),
     text: all(() => dense(bottom[0]).map((_, k) => Math.round(k / parts))).map(i => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
@@ -98,8 +110,9 @@ function mesh(run, at, field, range) {
 }
 
 function surface(run, at, field, range) {
-  const r = [...at.bottom[0], ...[...at.top[0]].reverse()], z = [...at.bottom[1], ...[...at.top[1]].reverse()];
-  const v = [...at.values, ...[...at.values].reverse()];
+  const [r, z] = [0, 1].map(axis => { const line = around(at, axis); return [...line, line[0]]; });
+  const edge = (of, value) => of[0].slice(1, -1).map(() => value), v = [...at.values, ...edge(at.end, at.values.at(-1)),
+    ...[...at.values].reverse(), ...edge(at.start, at.values[0]), at.values[0]];
   const turn = Array.from({length: 49}, (_, i) => 1.5 * Math.PI * i / 48), size = Math.max(...r);
   const x = run.axisymmetric ? turn.map(a => r.map(q => q * Math.cos(a))) : [-1, 1].map(() => r);
   const y = run.axisymmetric ? turn.map(a => r.map(q => q * Math.sin(a))) : [-1, 1].map(s => r.map(() => s * size));
@@ -110,7 +123,7 @@ function surface(run, at, field, range) {
 // Lowest and highest coordinates of all that is drawn: (r, z), of a sheet in three dimensions (x, y, z).
 function box(run) {
   const axes = run.mesh ? [0, 1, 2] : [0, 1], n = axes.length, low = axes.map(() => Infinity), high = axes.map(() => -Infinity);
-  for (const of of run.mesh ? ["points"] : ["bottom", "top"]) for (const points of (run.mesh || run.sheet)[of])
+  for (const of of run.mesh ? ["points"] : ["bottom", "top", "start", "end"]) for (const points of (run.mesh || run.sheet)[of])
     for (const map of run.images) for (const i of axes) for (const v of points[i]) {
       const at = map[i] * v + map[n + i];
       low[i] = Math.min(low[i], at); high[i] = Math.max(high[i], at);

@@ -70,8 +70,7 @@ def extruded(profile: Any, file: Any, comm: Any) -> None:
 
 def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower left and the upper right corner (r, z) of the box around a deformed sheet, length."""
-    points = np.vstack([profile.bottom, profile.top])
-    return points.min(0), points.max(0)
+    return profile.outline.min(0), profile.outline.max(0)
 
 
 def _mirrored(profile: Any) -> Any:
@@ -79,7 +78,8 @@ def _mirrored(profile: Any) -> Any:
     def whole(points):
         return np.vstack([points[:0:-1] * (-1, 1), points])
     faces = profile.reference_bottom, profile.reference_top, profile.bottom, profile.top
-    return type(profile)(*(whole(points) for points in faces))
+    other = None if profile.end is None else profile.end * (-1, 1)
+    return type(profile)(*(whole(points) for points in faces), other, profile.end)
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
@@ -103,19 +103,19 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
     ratio = profile.wall_ratio
     beyond = distance_to_line(profile.top, profile.bottom) / profile.original_thickness
-    rim = np.linspace(profile.bottom[-1], profile.top[-1], 3)[1:-1]
+    rim = np.linspace(profile.bottom[-1], profile.top[-1], 3)[1:-1] if profile.end is None else profile.end[1:-1]
     line = np.vstack([profile.bottom, rim, profile.top[::-1]])
     values = np.concatenate([ratio, np.full(len(rim), ratio[-1]), beyond[::-1]])
     with plotted(file) as plotter:
         shades = shading(values)
         plotter.add_mesh(swept(line, values), **shades, specular=0.25, split_sharp_edges=True)
         for s in (stations[0], stations[-1]):          # the cut faces
-            faces = [np.column_stack(place(side, s)) for side in (profile.bottom, profile.top)]
-            section = pyvista.StructuredGrid(*(np.stack([f[:, k] for f in faces], 1)[..., None] for k in range(3)))
-            section["ratio"] = np.tile(ratio, 2)
+            rows = [np.column_stack(place(row, s)) for row in profile.through_wall(np.linspace(0, 1, 17))]
+            section = pyvista.StructuredGrid(*(np.stack([row[:, k] for row in rows], 1)[..., None] for k in range(3)))
+            section["ratio"] = np.tile(ratio, len(rows))
             plotter.add_mesh(section, scalars="ratio", cmap=shades["cmap"], clim=shades["clim"], lighting=False,
                              show_scalar_bar=False)
-            points = np.vstack([faces[0], faces[1][::-1]])
+            points = np.column_stack(place(profile.outline, s))
             plotter.add_mesh(pyvista.lines_from_points(points, close=True), color="black", line_width=2)
         look(plotter, camera, np.vstack([np.column_stack(place(line, s)) for s in stations]))
 
