@@ -31,7 +31,7 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
         Points (x, y, z), shape (n, 3), length. For each triangle the row numbers of its three corners in the points,
         shape (m, 3), counter-clockwise seen from outside.
     """
-    line = np.vstack([refined(face, _EDGE_PIECES)[::sense] for face, sense in ((profile.bottom, 1), (profile.top, -1))])
+    line = _section(profile)[0]
     n = len(line)
     on_axis = np.abs(line[:, 0]) < 1e-9 * np.ptp(line)
     if axisymmetric:
@@ -56,6 +56,26 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
     return points, triangles
 
 
+def _section(profile: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return points on the outline of a section, and the positions of its first half along the sheet.
+
+    Args:
+        profile: the `Profile` of the section.
+
+    Returns:
+        Points (r, z), shape (2 k, 2), length: along the lower half of the start, the bottom and the lower half of the
+        end, and back along the upper half. Positions as fractional numbers of the nodes of the profile, shape (k,).
+    """
+    bottom, top = (refined(face, _EDGE_PIECES) for face in (profile.bottom, profile.top))
+    (below, above), (under, over) = (
+        (edge[1:len(edge) // 2], edge[-2:len(edge) // 2:-1]) if edge is not None else (bottom[:0], bottom[:0])
+        for edge in (profile.start, profile.end))           # without the middle: halves of equal numbers
+    last = len(profile.bottom) - 1
+    faces = np.arange(0, last + 1e-9, 2 / _EDGE_PIECES)
+    along = np.concatenate([np.zeros(len(below)), faces, np.full(len(under), last)])
+    return np.vstack([below[::-1], bottom, under, over[::-1], top[::-1], above]), along
+
+
 def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the closed surface of a deformed sheet, and the wall over original thickness at its points.
 
@@ -68,8 +88,7 @@ def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, 
         thickness at the points, shape (n,).
     """
     points, triangles = solid(profile, axisymmetric)
-    n = len(profile.bottom)
-    ratio = np.interp(np.arange(0, n - 1 + 1e-9, 2 / _EDGE_PIECES), np.arange(n), profile.wall_ratio)
+    ratio = np.interp(_section(profile)[1], np.arange(len(profile.bottom)), profile.wall_ratio)
     ratio = np.concatenate([ratio, ratio[::-1]])
     return points, triangles, np.tile(ratio, len(points) // len(ratio))
 
