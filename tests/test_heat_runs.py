@@ -174,6 +174,18 @@ def test_mixed_units_of_a_run_are_reported(caplog):
     assert "the diffusivity, conductivity / (density heat_capacity), is 1.06e-07, and the body 50 long" in caplog.text
     caplog.clear()
     mm = fx.ThermalProperties(conductivity=0.2e-3, density=1.05e-3, heat_capacity=1.8)
-    with pytest.raises(fx.ConvergenceError, match="are all laws in one system of units"):
-        fx.heat(sheet, mm, [fx.Radiation("top", emissivity=0.9, heater=450.0)], **laws)
+    heater = {"emissivity": 0.9, "heater": 450.0}
+    fx.heat(sheet, mm, [fx.Radiation("top", **heater)], **laws)
+    assert "are all in one system of units? sigma is" in caplog.text
+    caplog.clear()
+    fx.heat(sheet, mm, [fx.Radiation("top", stefan_boltzmann=5.67e-14, **heater)], **laws)
     assert not caplog.text
+
+
+def test_radiation_heats_to_its_steady_state():
+    """First steps in which Newton's method finds no solution are shortened."""
+    sheet = fx.mesh.disc(radius=0.02, thickness=0.004, elements=(3, 3))
+    polymer = fx.ThermalProperties(conductivity=0.2, density=1000.0, heat_capacity=2000.0)
+    run = fx.heat(sheet, polymer, [fx.Radiation(face, emissivity=0.9, heater=500.0) for face in ("bottom", "top")],
+                  start=20.0, times=1e6, unit="C", tolerance=0.1)
+    assert np.allclose(run.at_points([(0.0, 0.0), (0.0, 0.002)]), 500.0, atol=1e-6)

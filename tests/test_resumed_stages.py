@@ -3,6 +3,7 @@
 import pytest
 
 import formingx as fx
+from formingx.__main__ import main
 
 
 def scene():
@@ -52,3 +53,11 @@ def test_the_last_stage_continues_to_another_end(folder):
     longer = [(1, 0), (3, 5.0), (4, 5.0)]
     path = resumed([*stages(table=longer), fx.Stage("hold", duration=1.0)], folder)
     assert path.last.time == pytest.approx(5.0) and path["ball_travel"][-1] == pytest.approx(5.0)
+
+
+def test_status_names_the_target_of_a_stage_with_a_speed(tmp_path, capsys):
+    """Process time controls such a stage; the target is the only pressure."""
+    fx.Process(scene()).run(stages()[:1], accuracy="draft", checkpoint=tmp_path / "run", progress=False)
+    assert main(["status", str(tmp_path / "run")]) == 0
+    said = capsys.readouterr().out
+    assert "stage 'air': pressure 0.01 of 0.01" in said and "the target is met" in said

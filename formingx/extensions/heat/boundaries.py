@@ -12,6 +12,9 @@ from ...values.table import Table
 STEFAN_BOLTZMANN = 5.670374419e-8
 """Stefan-Boltzmann constant, W/(m2 K4)."""
 
+LARGEST_BIOT_NUMBER = 1e4
+"""Largest plausible heat transfer coefficient times thickness over conductivity: 1e6 W/(m2 K) and 2 mm of a polymer."""
+
 
 class ThermalProperties:
     """Thermal properties of a material, in one consistent set of units (in SI: W/(m K), kg/m3, J/(kg K)).

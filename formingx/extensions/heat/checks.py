@@ -12,10 +12,11 @@ from ...materials.solidification import Solidification
 from ...ranks import gathered
 from ...values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 from ...values.tolerances import MEASURED_ACCURACY
+from .boundaries import LARGEST_BIOT_NUMBER
 from .cooling_history import CoolingHistory
 from .expansion import ThermalExpansion
 from .layers import graded, height_at
-from .run import checked_materials, implausible_diffusivities
+from .run import checked_materials, implausible_diffusivities, implausible_radiation
 
 _FROZEN = (", where the material does not relax any more: give Solidification or a modulus that rises, if it turns into"
            " glass")
@@ -172,11 +173,12 @@ def implausible_units(body: Any) -> Iterator[Finding]:
     conductivity = min(material.conductivity for material in materials)
     for face, conductance in scene.heat.conductances(scene).items():
         biot = conductance * body.thickness / conductivity
-        if 1e4 < biot < np.inf:
+        if LARGEST_BIOT_NUMBER < biot < np.inf:
             yield Finding("warning", f"boundary {face!r}", f"its conductance {conductance:g} is {biot:.2g} times"
                           f" conductivity over thickness: are both in one system of units? 1000 W/(m2 K) is 1e-3 in W,"
                           f" mm and K")
-    for text in implausible_diffusivities(materials, body.length):
+    for text in [*implausible_diffusivities(materials, body.length),
+                 *implausible_radiation(materials, scene.heat.boundaries, body.thickness, zero)]:
         yield Finding("warning", "heat", text)
 
 

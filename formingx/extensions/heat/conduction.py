@@ -189,7 +189,7 @@ class Conduction(HeatVectors):
                 return self._end_of_stage(T, change, known, c, responses)
             if not np.isfinite(last):
                 break
-        raise ConvergenceError("heat: Newton's method did not converge in a step: are all laws in one system of units?")
+        raise ConvergenceError("heat: Newton's method did not converge in a step")
 
     def difference(self, known: list[np.ndarray], c: float) -> tuple[float, np.ndarray]:
         r"""Return the temperature changes that given heats cause in a linearised implicit step.

@@ -15,9 +15,10 @@ from ...mesh import Mesh
 from ...mesh.nodes import dof_positions, span
 from ...physics.kinematics import Axisymmetric
 from ...scene import fields
+from ...values.table import Table
 from ...values.temperature import ABSOLUTE_ZERO
 from . import stepping
-from .boundaries import Absorption, FixedTemperature, ThermalProperties
+from .boundaries import LARGEST_BIOT_NUMBER, Absorption, FixedTemperature, Radiation, ThermalProperties
 from .conduction import Conduction
 from .layers import layered
 from .result import HeatRun
@@ -77,8 +78,9 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
     if displacement is not None and getattr(displacement, "ufl_shape", None) != (2,):
         raise InputError(f"heat: displacement = {displacement!r}: must be a Function or expression (u_r, u_z)")
     tolerance = positive("heat: tolerance", tolerance)
-    length = float(np.ptp(span(mesh.domain, mesh.comm), axis=0).max())
-    for text in implausible_diffusivities(materials.values(), length):
+    sizes = np.ptp(span(mesh.domain, mesh.comm), axis=0)
+    for text in [*implausible_diffusivities(materials.values(), float(sizes.max())),
+                 *implausible_radiation(materials.values(), boundaries, float(sizes.min()), ABSOLUTE_ZERO[unit])]:
         _log.warning("heat: %s", text)
     moved = None if displacement is None else _Displacement(displacement, mesh)
     fine = layered(mesh, _depths(materials, boundaries, outputs), moved)
@@ -185,7 +187,8 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
             if found.error > tolerance:
                 if dt < 1e-13 * outputs[-1]:
                     raise ConvergenceError(f"heat: steps became shorter than {dt:.3g} at time {t:.6g}: the estimated"
-                                           f" error does not fall below {tolerance:g}", run)
+                                           f" error does not fall below {tolerance:g}: are all laws in one system of"
+                                           f" units?", run)
                 continue
             if len(run.times) > max_steps:
                 raise ConvergenceError(f"heat: max_steps = {max_steps} were used up at time {t:.6g}", run)
@@ -236,6 +239,30 @@ def implausible_diffusivities(materials: Iterable[ThermalProperties], length: fl
             yield (f"the diffusivity, conductivity / (density heat_capacity), is {value:.3g}, and the body {length:.3g}"
                    f" long: polymers have about 1e-7 m2/s, 0.1 mm2/s. Are conductivity, density, heat capacity and"
                    f" lengths in one system of units?")
+
+
+def implausible_radiation(materials: Iterable[ThermalProperties], boundaries: Iterable[Any], thickness: float,
+                           zero: float) -> Iterator[str]:
+    """Yield a text for each radiation that heats a face far faster than conduction cools it, as in mixed units.
+
+    Between a heater of 1000 K and 2 mm of a polymer the Biot number is about 2.
+
+    Args:
+        materials: thermal properties of the layers.
+        boundaries: laws of heat.
+        thickness: smallest extent of the body, length.
+        zero: absolute zero in the unit of temperatures.
+    """
+    conductivity = min(material.conductivity for material in materials)
+    for law in boundaries:
+        if isinstance(law, Radiation):
+            heater = law.parameters["heater"]
+            hottest = (float(heater.y.max()) if isinstance(heater, Table) else heater) - zero
+            biot = 4 * law.parameters["stefan_boltzmann"] * hottest**3 * thickness / conductivity
+            if biot > LARGEST_BIOT_NUMBER:
+                yield (f"{law!r}: heat by radiation, 4 sigma T^3, is {biot:.2g} times conductivity over thickness: are"
+                       f" all in one system of units? sigma is 5.67e-8 in W, m and K, and 5.67e-14 in W, mm and K:"
+                       f" stefan_boltzmann=5.67e-14")
 
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:

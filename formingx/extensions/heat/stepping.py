@@ -9,6 +9,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ...errors import ConvergenceError
 from .conduction import Conduction
 
 _D, _W = 1 - np.sqrt(0.5), np.sqrt(0.125)
@@ -44,16 +45,16 @@ def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
         dt: length of the step, time.
 
     Returns:
-        State, error and heats at the end of the step.
-
-    Raises:
-        ConvergenceError: Newton's method found no solution in a stage.
+        State, error and heats at the end of the step. The error is infinite if Newton's method found no solution.
     """
     c = dt * _D
     first, heats_first = body.rates(state)
-    second = body.stage(state, [c * r for r in first], c, np.zeros_like(state[0]))
-    known = [dt * _W * (a + b) for a, b in zip(first, second.rates)]
-    third = body.stage(state, known, c, second.changes[0])
+    try:
+        second = body.stage(state, [c * r for r in first], c, np.zeros_like(state[0]))
+        known = [dt * _W * (a + b) for a, b in zip(first, second.rates)]
+        third = body.stage(state, known, c, second.changes[0])
+    except ConvergenceError:
+        return Step(state, np.inf, 0.0, 0 * heats_first)
     rates = (first, second.rates, third.rates)
     errors = [dt * sum(w * r for w, r in zip(_ERROR, parts)) for parts in zip(*rates)]
     error, _ = body.difference(errors, c)

@@ -1,7 +1,7 @@
 """Status of a run, read from the last states of its checkpoint while it runs."""
 
 import time
-from collections.abc import Container, Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -30,7 +30,7 @@ class Status:
             the target is a value of no column.
         computing_time: computing time up to the last completed step, s.
         remaining_time: computing time to the end of the stage, extrapolated from the last 20 steps, s; 0 if the target
-            is met. None without a target, or if the last steps came no nearer to it.
+            is met. None without a column of the target, or if the last steps came no nearer to it.
         limits: {reason for a shorter or failed step: count}, over the whole run.
         age: time since the last state was written, s.
         ended: {"failure": error message or "", "findings": [Finding]} of a run that has ended. None if it runs, or
@@ -107,25 +107,27 @@ def of_folder(folder: Any) -> Status:
     stepping: dict[str, Any] = done[-1]["stepping"] if done else {}
     counts = stepping.get("counts", {})
     name, goal = target_column(stepping, last["measures"]) or ("", 0.0)
+    met = last["target"] is not None and last["target"][:2] == stepping.get("until")
     if name not in last["measures"]:
-        return Status(n, last["stage"], last["inadmissible_reason"], None, counts.get("seconds", 0.0), None,
-                      counts.get("limits", {}), age, ended)
+        return Status(n, last["stage"], last["inadmissible_reason"], None, counts.get("seconds", 0.0),
+                      0.0 if met else None, counts.get("limits", {}), age, ended)
     now, before = done[-1]["measures"][name], done[0]["measures"][name]
     moved = {c: (done[0]["measures"][c], done[-1]["measures"][c]) for c in _MOVES if c in last["measures"]}
     leader = max(moved, key=lambda c: abs(np.subtract(*moved[c])) / (max(map(abs, moved[c])) or 1.0), default=None)
     won = 1 - abs(goal - now) / abs(goal - before) if goal != before else 0.0
     took = counts["seconds"] - done[0]["stepping"]["counts"]["seconds"]
     nearer = won > 0 and abs(goal - now) < abs(goal - done[-2]["measures"][name])
-    remaining = 0.0 if abs(now - goal) <= ROUND_OFF * abs(goal) else took * (1 - won) / won if nearer else None
+    remaining = 0.0 if met or abs(now - goal) <= ROUND_OFF * abs(goal) else took * (1 - won) / won if nearer else None
     moving = leader if leader and not np.isclose(*moved[leader], rtol=NEGLIGIBLE, atol=0.0) else None
     return Status(n, last["stage"], last["inadmissible_reason"], (name, goal, now), counts["seconds"], remaining,
                   counts.get("limits", {}), age, ended, len(done) == 1, (moving, *moved[moving]) if moving else None)
 
 
-def target_column(stepping: dict[str, Any], measures: Container[str]) -> tuple[str, float] | None:
+def target_column(stepping: dict[str, Any], measures: Collection[str]) -> tuple[str, float] | None:
     """Return the target of a run or stage, as a column and its value.
 
-    A target such as `pressure(0.2)` of one of several loads becomes the column of this load, such as "air_pressure".
+    A target such as `pressure(0.2)` of one of several loads becomes the column of this load, such as "air_pressure". If
+    the time controls the stage, this is known only if one column suits.
 
     Args:
         stepping: data from which a run can be resumed (`State.stepping`), among them its target.
@@ -139,7 +141,10 @@ def target_column(stepping: dict[str, Any], measures: Container[str]) -> tuple[s
         return None
     name, goal = stepping["until"]
     driven = stepping.get("column", "")
-    return (driven if name not in measures and driven.endswith(f"_{name}") else name), goal
+    if name in measures:
+        return name, goal
+    suitable = [column for column in measures if column.endswith(f"_{name}")]
+    return (driven if driven.endswith(f"_{name}") else suitable[0] if len(suitable) == 1 else name), goal
 
 
 def _words(seconds: float) -> str:
