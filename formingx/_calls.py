@@ -237,7 +237,7 @@ def _described(kind: Any) -> str:
     if origin is collections.abc.Callable:
         return "a function"
     if isinstance(origin, type) and issubclass(origin, Mapping):
-        return "a dict" + (f" of {_described(of[0])}: {_described(of[1])}" if len(of) == 2 else "")
+        return "a dict" + (f" {{{_described(of[0])}: {_described(of[1])}}}" if len(of) == 2 else "")
     if origin in (os.PathLike, Path):
         return "a path"
     if origin is tuple and of and Ellipsis not in typing.get_args(kind):

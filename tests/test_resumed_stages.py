@@ -60,4 +60,4 @@ def test_status_names_the_target_of_a_stage_with_a_speed(tmp_path, capsys):
     fx.Process(scene()).run(stages()[:1], accuracy="draft", checkpoint=tmp_path / "run", progress=False)
     assert main(["status", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out
-    assert "stage 'air': pressure 0.01 of 0.01" in said and "the target is met" in said
+    assert "stage 'air': air pressure 0.01 of 0.01" in said and "the target is met" in said

@@ -109,7 +109,7 @@ def test_a_study_continues_from_its_folder(here, tmp_path):
     again = run(here, folder=tmp_path / "runs")
     assert len(RUNS) == 6 and again.runs == found.runs
     with pytest.raises(fx.InputError, match="holds another study"):
-        fx.study(formula, {"x": [1.0]}, {"f": f}, executor=here, folder=tmp_path / "runs")
+        fx.study(formula, {"x": [1.0], "y": [1.0]}, {"f": f}, executor=here, folder=tmp_path / "runs")
     (tmp_path / "other").mkdir()
     (tmp_path / "other" / "thesis.txt").write_text("mine")
     with pytest.raises(fx.InputError, match="holds no study"):
@@ -173,12 +173,34 @@ def test_refining_finds_the_maximum_between_the_levels(here):
 
 
 def test_wrong_arguments_of_studies_are_refused():
-    for given, message in ((({"x": [1]}, {"f": lambda path: 1.0}), "importable by name"), (({}, {"f": f}), "variables"),
-                           (({"x": ["a"]}, {"f": f}), "study: x = 'a'"), (({"x": [1]}, {}), "measures = {}")):
+    both = {"x": [1], "y": [1]}
+    for given, message in (((both, {"f": lambda path: 1.0}), "importable by name"), (({}, {"f": f}), "variables"),
+                           (({"x": ["a"]}, {"f": f}), "study: x = 'a'"), ((both, {}), "measures = {}"),
+                           (({"x": [1]}, {"f": f}), "cannot be called with these: missing .* 'y'"),
+                           ((both | {"z": [1]}, {"f": f}), "cannot be called with these: .* 'z'")):
         with pytest.raises(fx.InputError, match=message):
             fx.study(formula, *given, progress=False)
     with pytest.raises(fx.InputError, match="goal of f: 'big' is not known"):
-        fx.study(formula, {"x": [1]}, {"f": f}, goal={"f": "big"})
+        fx.study(formula, both, {"f": f}, goal={"f": "big"})
+    with pytest.raises(fx.InputError, match="workers = 0: must be a whole number of at least 1"):
+        fx.study(formula, both, {"f": f}, workers=0)
+    with pytest.raises(fx.InputError, match=r"goal = 'f': must be a dict \{a word: a word\} or None"):
+        fx.study(formula, both, {"f": f}, goal="f")
+
+
+def test_a_run_that_failed_by_a_fault_of_the_script_is_repeated(here, tmp_path):
+    def study(measure):
+        return fx.study(formula, {"x": [1, 3], "y": [2]}, {"f": measure}, executor=here, progress=False,
+                        folder=tmp_path / "runs")
+    assert [run.error[:10] for run in study(lambda path: path.F).runs] == ["AttributeE", "Convergenc"]
+    for _ in range(2):
+        assert [run.error[:10] for run in study(f).runs] == ["", "Convergenc"]
+    assert RUNS == [(1, 2), (3, 2), (1, 2)]
+
+
+def test_an_unknown_column_is_named_with_the_known_ones(here):
+    found = fx.study(formula, {"x": [1], "y": [2]}, {"f": "presure"}, executor=here, progress=False)
+    assert found.runs[0].error == "InputError: measure 'f': column 'presure' is not known; known: 'g'"
 
 
 def test_runs_in_processes():

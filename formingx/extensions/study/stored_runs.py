@@ -46,6 +46,8 @@ def prepare_folder(folder: FilePath, task: Task, variables: list[str]) -> FilePa
 def read(folder: FilePath, variables: list[str]) -> list[StudyRun]:
     """Return the runs stored in the folder of a study, one for each set of values.
 
+    A run that failed by a fault of the script is repeated by the study; its second run replaces it.
+
     Args:
         folder: path of the folder.
         variables: names of the variables of the study.
@@ -56,7 +58,7 @@ def read(folder: FilePath, variables: list[str]) -> list[StudyRun]:
     Raises:
         InputError: a file that cannot be read.
     """
-    found: list[StudyRun] = []
+    found: list[StudyRun] = []                                  # of runs with equal values the first final one counts
     for file in sorted(_files(folder)):
         try:
             run = StudyRun(**_json(file))
@@ -67,6 +69,7 @@ def read(folder: FilePath, variables: list[str]) -> list[StudyRun]:
         if not valid:
             raise InputError(f"study: {str(file)!r} is damaged: it holds no run of this study; remove it, and the run"
                              f" is made again")
+        found = [other for other in found if other.is_final or other.values != run.values]
         found += [run] if all(run.values != other.values for other in found) else []
     return found
 

@@ -17,6 +17,7 @@ The results are tables, main effects, and the best run.
 
 from __future__ import annotations
 
+import inspect
 import math
 import os
 from collections.abc import Callable, Mapping, Sequence
@@ -290,7 +291,8 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         measures: {name: function of the path that returns a number, or name of a column of the path}. Of a column the
             value in the last state counts.
         goal: {measure: "max" or "min"}; the first one defines the best run.
-        folder: folder for the results of the runs. Runs stored there are not repeated.
+        folder: folder for the results of the runs. Runs stored there are not repeated, unless they failed by another
+            error than a `ConvergenceError`.
         executor: an executor of `concurrent.futures`, or `mpi4py.futures.MPIPoolExecutor`. Default: processes of this
             machine. Functions run in other processes must be importable: no lambda, no function inside another.
         workers: number of parallel processes; default one per core.
@@ -318,11 +320,18 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         check_name("study: goal", name, task.measures)
         check_name(f"study: goal of {name}:", direction, ("max", "min"))
     names = list(cases[0])
+    try:
+        inspect.signature(build).bind(**dict.fromkeys(names))
+    except TypeError as error:
+        raise InputError(f"study: variables {', '.join(map(repr, names))}: build{inspect.signature(build)} cannot be"
+                         f" called with these: {error}") from None
+    workers = (os.cpu_count() or 1) if workers is None else count("study: workers", workers)
     folder = None if folder is None else stored_runs.prepare_folder(file_path("study: folder", folder), task, names)
     found = Study(task, names, goals, folder)
-    found.runs += [] if folder is None else stored_runs.read(folder, names)
+    stored = [] if folder is None else stored_runs.read(folder, names)
+    found.runs += [run for run in stored if run.is_final or run.values not in cases]
     missing = [case for case in cases if not any(run.values == case for run in found.runs)]
-    with executor_context(executor, min(workers or os.cpu_count() or 1, max(len(missing), 1))) as pool:
+    with executor_context(executor, min(workers, max(len(missing), 1))) as pool:
         if isinstance(pool, futures.ProcessPoolExecutor):
             check_importable(task)
         runs = completed_runs(pool, task, missing)

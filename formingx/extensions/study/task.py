@@ -13,7 +13,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-from ...errors import InputError
+from ...errors import ConvergenceError, InputError, check_name
 
 Measure = Callable[[Any], float] | str
 """A function of the path that returns a number, or the name of a column of the path."""
@@ -37,6 +37,11 @@ class StudyRun:
     seconds: float = 0.0
     warnings: list[str] = field(default_factory=list)
 
+    @property
+    def is_final(self) -> bool:
+        """True if a study does not repeat the run: it succeeded, or it found no equilibrium."""
+        return not self.error or self.error.startswith(f"{ConvergenceError.__name__}: ")
+
 
 class Task(NamedTuple):
     """Task of one process: it runs the user's function for a set of values, and evaluates the measures of the run.
@@ -58,6 +63,9 @@ class Task(NamedTuple):
         log.addFilter(log_filter)
         try:
             result = self.build(**values)
+            for name, measure in self.measures.items():
+                if isinstance(measure, str):
+                    check_name(f"measure {name!r}: column", measure, result.last.measures)
             found = {name: float(result.last.measures[measure] if isinstance(measure, str) else measure(result))
                      for name, measure in self.measures.items()}
             error = next((f"{name} is not a finite number" for name, v in found.items() if not math.isfinite(v)), "")
