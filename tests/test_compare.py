@@ -52,6 +52,12 @@ def test_known_shift():
     assert found.differences["a"].range == 2.0
 
 
+def test_short_curves_do_not_tell_their_resolution():
+    t = np.linspace(0, 1, 4)
+    found = str(fx.compare({"a": t, "b": t}, {"a": t, "b": 2 * t}))
+    assert "fewer than five points" in found and "inf" not in found
+
+
 @pytest.mark.parametrize("factor", [1.03, 0.8])
 def test_walls_are_compared_at_the_same_radius(factor):
     """A wall that is thicker by a factor, at other nodes and in reverse order, differs by this factor."""

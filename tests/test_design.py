@@ -341,6 +341,17 @@ def test_minimum_weight():
     assert answer.best.wall.max() < 0.0125
 
 
+def test_minimum_weight_keeps_a_parameter_without_effect():
+    """A modulus changes no wall at a given height, but for round-off: the search leaves it at its start."""
+    def build(h, modulus):
+        mesh = fx.mesh.disc(radius=1.0, thickness=lambda R: np.exp(h(R)) / 50, elements=(10, 1))
+        return fx.Scene(mesh=mesh, materials=fx.Gent(mu=modulus, Jm=50.0), **CAN), fx.pole_height(0.6)
+    design = fx.Design(build, {"h": fx.spline(3, start=0.0, low=-1, high=1), "modulus": (0.6, 0.2, 2.0)})
+    answer = design.minimum_weight(min_wall=0.012, max_runs=6)
+    assert answer.best.vector[-1] == 0.6 and "modulus at its" not in str(answer)
+    assert answer.best.volume < 0.98 * answer.before.volume
+
+
 def test_report(tmp_path):
     """Reports of a search and of a run are single files with pictures, bounds and parameters without effect."""
     design = fx.Design(lambda h, idle: programmed(h), {"h": fx.spline(4, 0.0, -0.04, 1.0), "idle": (1.0, 0.0, 2.0)})

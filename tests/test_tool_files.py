@@ -83,8 +83,9 @@ def test_end_to_end_and_the_side_of_the_body(tmp_path):
     other = tools.read(tmp_path / "cup.geo", body=(20.0, 3.0))
     np.testing.assert_allclose(other.signed_distance(POINTS), -same.signed_distance(POINTS), atol=1e-12)
     np.testing.assert_allclose(other.reversed().signed_distance(POINTS), same.signed_distance(POINTS), atol=1e-12)
-    with pytest.raises(fx.InputError, match="the body is on both sides of the profile"):
-        tools.read(tmp_path / "cup.geo", body=fx.mesh.disc(radius=12.0, thickness=0.5, elements=(4, 1)))
+    for radius, remedy in (12.0, "move the tool or the body"), (12000.0, "body 1.2e.04: give the unit of your script"):
+        with pytest.raises(fx.InputError, match=f"the body is on both sides of the profile.*{remedy}"):
+            tools.read(tmp_path / "cup.geo", body=fx.mesh.disc(radius=radius, thickness=radius / 24, elements=(4, 1)))
 
 
 @pytest.mark.parametrize("more, words", [

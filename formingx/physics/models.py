@@ -96,7 +96,7 @@ class Membrane(Model):
 
     The thickness stretch preserves the volume exactly (Adkins and Rivlin 1952). Layers are bonded and their energies
     add up. A membrane has no stress through its thickness. It has no bending stiffness either, so the rim of a section
-    cannot be clamped.
+    cannot be clamped. A section has no contact with tools as a membrane; a sheet in three dimensions has.
 
     Args:
         wrinkles: fraction of the stiffness, up to 1, that remains where a sheet in three dimensions wrinkles, for

@@ -1,6 +1,7 @@
 """Temperature at points of a body from a number, a function, a table, a file, or an earlier run."""
 
 import os
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,8 @@ from ..mesh.nodes import axes
 from ..ranks import gathered
 from ..values.table import Table
 
-_WHAT = "a number, a table over {0}, a function of ({0}, {1}), a CSV file, what fx.heat returned, or a DOLFINx Function"
+_WHAT = ("a number, a table({{{0}: value}}), a function of ({0}, {1}), a CSV file, what fx.heat returned, or a DOLFINx"
+         " Function")
 
 
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
@@ -57,8 +59,8 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
         name: name of the argument, for messages.
         axes: names of the coordinates, "RZ" or "xy".
     """
-    if isinstance(field, type):
-        raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}, not a class")
+    if isinstance(field, type | Mapping | Sequence) and not isinstance(field, str):
+        raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}")
     if isinstance(field, Table):
         field.check(points[:, 0], axes[0])
         found = field(points[:, 0])

@@ -115,10 +115,6 @@ def check_hinges(scene: Any) -> None:
         at_rim = _layers_at(scene, constraint.on)
         hard = max(at_rim, key=moduli.__getitem__)
         soft = min(at_rim, key=moduli.__getitem__)
-        if not constraint.by_stiffness and moduli[hard] > 100 * moduli[soft]:
-            raise InputError(f"Scene: SimplySupported({constraint.on!r}) pulls all layers with the same traction, but"
-                             f" layer {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
-                             f" SimplySupported({constraint.on!r}, weight='stiffness')")
         pressed = {name for load in scene.loads if load.on is not None
                    for name in _layers_at(scene, load.on)} & at_rim
         for name in pressed:
@@ -126,6 +122,10 @@ def check_hinges(scene: Any) -> None:
                 raise InputError(f"Scene: the pressure that bends layer {hard!r} would squeeze layer {name!r},"
                                  f" {moduli[hard] / moduli[name]:.3g} times softer, out of the free face of the"
                                  f" hinge SimplySupported({constraint.on!r}): use Clamped({constraint.on!r})")
+        if not constraint.by_stiffness and moduli[hard] > 100 * moduli[soft]:
+            raise InputError(f"Scene: SimplySupported({constraint.on!r}) pulls all layers with the same traction, but"
+                             f" layer {soft!r} is {moduli[hard] / moduli[soft]:.3g} times softer than {hard!r}: use"
+                             f" SimplySupported({constraint.on!r}, weight='stiffness')")
 
 
 def _layers_at(scene: Any, boundary: str) -> set[str]:

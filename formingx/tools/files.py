@@ -102,8 +102,13 @@ def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
         points = np.array([pair("tools.read: body", body)])
     depth, tolerance = tool.signed_distance(points), 1e-6 * tool.size
     if depth.max() > tolerance and depth.min() < -tolerance:
+        large = float(np.ptp(points, axis=0).max())
+        one_unit = len(points) == 1 or tool.size / 100 < large < 100 * tool.size
+        remedy = ("move the tool or the body" if one_unit else
+                  f"the tool is {tool.size:.3g} large and the body {large:.3g}: give the unit of your script,"
+                  f" units=...")
         raise InputError(f"tool file {file!r}: the body is on both sides of the profile, up to {depth.max():.6g} and"
-                         f" {-depth.min():.6g} away from it: move the tool or the body")
+                         f" {-depth.min():.6g} away from it: {remedy}")
     return tool.reversed() if depth.max() > tolerance else tool
 
 

@@ -100,7 +100,8 @@ class Comparison:
             lines.append("  none on either side")
         ours, theirs = self.resolution
         lines.append(f"with every other point left out, our curve moves by {ours:.1e} of its range, theirs by"
-                     f" {theirs:.1e}")
+                     f" {theirs:.1e}" if np.isfinite([ours, theirs]).all() else
+                     "a curve of fewer than five points does not tell how well it is resolved")
         return "\n".join(lines)
 
     __repr__ = __str__

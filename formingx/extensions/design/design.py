@@ -17,6 +17,7 @@ from ...scene.scene import Scene
 from ...solve.newton import Tolerances
 from ...solve.stage import Stage
 from ...solve.stepping import StepControl
+from ...values.tolerances import NEGLIGIBLE
 from .objective import SETTINGS, MeasuredWallObjective, WallObjective, mask_of_range, missed_target
 from .parameters import Parameters
 from .result import DesignResult
@@ -260,8 +261,10 @@ class Design:
             n = len(size)
             # a slack variable for the missing wall makes the program feasible
             rows = np.column_stack([-jacobian[inside] * size, -np.full(inside.sum(), unit)])
-            bounds = [(max((a - v) / s, -trust_radius), min((b - v) / s, trust_radius))
-                      for a, b, v, s in zip(low, high, best.vector, size)]
+            effects = np.vstack([jacobian[inside] / wall[inside].mean(), volume_slope]) * size
+            bounds = [(max((a - v) / s, -trust_radius), min((b - v) / s, trust_radius)) if effect >= NEGLIGIBLE
+                      else (0.0, 0.0)                           # the program would move it to any place
+                      for a, b, v, s, effect in zip(low, high, best.vector, size, abs(effects).max(0))]
             found = linprog(np.append(volume_slope * size, 10.0), A_ub=rows, b_ub=wall[inside] - min_wall,
                             bounds=[*bounds, (0, None)])
             step = found.x[:n] * size

@@ -12,8 +12,13 @@ from ...values.table import Table
 STEFAN_BOLTZMANN = 5.670374419e-8
 """Stefan-Boltzmann constant, W/(m2 K4)."""
 
-LARGEST_BIOT_NUMBER = 1e4
-"""Largest plausible heat transfer coefficient times thickness over conductivity: 1e6 W/(m2 K) and 2 mm of a polymer."""
+def is_implausible(biot_number: float) -> bool:
+    """Return True for a finite Biot number above 1e4, that of 1e6 W/(m2 K) and 2 mm of a polymer.
+
+    Args:
+        biot_number: heat transfer coefficient times thickness over conductivity.
+    """
+    return 1e4 < biot_number < float("inf")
 
 
 class ThermalProperties:

@@ -12,7 +12,7 @@ from ...materials.solidification import Solidification
 from ...ranks import gathered
 from ...values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 from ...values.tolerances import MEASURED_ACCURACY
-from .boundaries import LARGEST_BIOT_NUMBER
+from .boundaries import is_implausible
 from .cooling_history import CoolingHistory
 from .expansion import ThermalExpansion
 from .layers import graded, height_at
@@ -173,7 +173,7 @@ def implausible_units(body: Any) -> Iterator[Finding]:
     conductivity = min(material.conductivity for material in materials)
     for face, conductance in scene.heat.conductances(scene).items():
         biot = conductance * body.thickness / conductivity
-        if LARGEST_BIOT_NUMBER < biot < np.inf:
+        if is_implausible(biot):
             yield Finding("warning", f"boundary {face!r}", f"its conductance {conductance:g} is {biot:.2g} times"
                           f" conductivity over thickness: are both in one system of units? 1000 W/(m2 K) is 1e-3 in W,"
                           f" mm and K")

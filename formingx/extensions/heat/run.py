@@ -18,7 +18,7 @@ from ...scene import fields
 from ...values.table import Table
 from ...values.temperature import ABSOLUTE_ZERO
 from . import stepping
-from .boundaries import LARGEST_BIOT_NUMBER, Absorption, FixedTemperature, Radiation, ThermalProperties
+from .boundaries import Absorption, FixedTemperature, Radiation, ThermalProperties, is_implausible
 from .conduction import Conduction
 from .layers import layered
 from .result import HeatRun
@@ -256,10 +256,10 @@ def implausible_radiation(materials: Iterable[ThermalProperties], boundaries: It
     conductivity = min(material.conductivity for material in materials)
     for law in boundaries:
         if isinstance(law, Radiation):
-            heater = law.parameters["heater"]
-            hottest = (float(heater.y.max()) if isinstance(heater, Table) else heater) - zero
-            biot = 4 * law.parameters["stefan_boltzmann"] * hottest**3 * thickness / conductivity
-            if biot > LARGEST_BIOT_NUMBER:
+            sigma, hottest = (float(np.max(given.y if isinstance(given, Table) else given))
+                              for given in map(law.parameters.__getitem__, ("stefan_boltzmann", "heater")))
+            biot = 4 * sigma * (hottest - zero)**3 * thickness / conductivity
+            if is_implausible(biot):
                 yield (f"{law!r}: heat by radiation, 4 sigma T^3, is {biot:.2g} times conductivity over thickness: are"
                        f" all in one system of units? sigma is 5.67e-8 in W, m and K, and 5.67e-14 in W, mm and K:"
                        f" stefan_boltzmann=5.67e-14")
