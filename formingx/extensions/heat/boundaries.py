@@ -12,6 +12,7 @@ from ...values.table import Table
 STEFAN_BOLTZMANN = 5.670374419e-8
 """Stefan-Boltzmann constant, W/(m2 K4)."""
 
+
 def is_implausible(biot_number: float) -> bool:
     """Return True for a finite Biot number above 1e4, that of 1e6 W/(m2 K) and 2 mm of a polymer.
 
