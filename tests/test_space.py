@@ -186,6 +186,10 @@ def test_a_run_in_three_dimensions_continues_from_a_checkpoint(tmp_path):
         edge = wall.section((0, 0, 0), normal)
         assert edge["arc_length"][-1] == pytest.approx(cut["arc_length"][-1], abs=0.05) and np.ptp(edge["y"]) < 1e-8
     assert wall.mean_ratio((0, 0, 0), 10.0) == pytest.approx((wall.ratio * wall.reference_area).sum() / 0.3)
+    for far, message in ((lambda: wall.thickness_at(-0.5, 0.15), "not on the modelled sheet, X from 0 to 1 and Y"),
+                         (lambda: wall.mean_ratio((0, 0, 9.0), 0.1), "is 9.* away from the modelled part")):
+        with pytest.raises(fx.InputError, match=message):
+            far()
     with pytest.raises(fx.InputError, match=r"normal = \(0, 0, 0\): must not be 0"):
         whole.wall().section((0, 0.15, 0), (0, 0, 0))
     whole.to_stl(tmp_path / "part.stl")

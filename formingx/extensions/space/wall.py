@@ -15,6 +15,7 @@ from ...mesh.edges import edges_of
 from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from ...ranks import gathered
 from ...results.files.column_table import ColumnTable
+from ...results.numbers import without_round_off
 from .surface import wrinkled
 
 
@@ -116,8 +117,16 @@ class SheetWall(ColumnTable):
 
         Returns:
             Deformed wall thickness, length.
+
+        Raises:
+            InputError: a position off the sheet, such as in the quarter that is not modelled.
         """
-        away = np.hypot(*(self.reference_points[:, :COORDINATES] - pair("thickness_at", (x, y))).T)
+        flat = self.reference_points[:, :COORDINATES]
+        away = np.hypot(*(flat - pair("thickness_at", (x, y))).T)
+        if away.min() > np.linalg.norm(np.diff(self.reference_points[self.triangles], axis=1), axis=2).max():
+            a, c, b, d = without_round_off([*flat.min(0), *flat.max(0)], flat)
+            raise InputError(f"thickness_at: ({x:.6g}, {y:.6g}) is not on the modelled sheet, X from {a:.4g} to {b:.4g}"
+                             f" and Y from {c:.4g} to {d:.4g}")
         return float(self.at_nodes[np.argmin(away)])
 
     def mean_ratio(self, point: tuple[float, float, float], radius: float) -> float:
@@ -134,11 +143,16 @@ class SheetWall(ColumnTable):
             Deformed over reference thickness.
 
         Raises:
-            InputError: a radius that is not positive.
+            InputError: a radius that is not positive, or a point that is farther than the radius and an edge of a
+                triangle from the modelled part.
         """
         away = np.linalg.norm(self.middle - triple("mean_ratio: point", point), axis=1)
         near = away <= positive("mean_ratio: radius", radius)
         if not near.any():
+            longest = np.linalg.norm(np.diff(self.deformed_points[self.triangles], axis=1), axis=2).max()
+            if away.min() > radius + longest:
+                raise InputError(f"mean_ratio: the point {tuple(point)} is {away.min():.4g} away from the modelled"
+                                 f" part")
             return float(self.ratio[np.argmin(away)])
         return float(np.average(self.ratio[near], weights=self.reference_area[near]))
 
