@@ -245,4 +245,4 @@ def _described(kind: Any) -> str:
     if isinstance(origin, type) and issubclass(origin, Iterable) and of:
         return f"a list of {_described(of[0])}"
     name = getattr(origin, "__name__", str(origin))
-    return f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
+    return f"{'an' if name[0] in 'AEIO' else 'a'} {name}"

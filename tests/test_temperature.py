@@ -134,6 +134,14 @@ def test_wrong_temperatures_are_refused(material, temperature, words):
         scene(material, temperature)
 
 
+@pytest.mark.parametrize("material, used", [
+    (fx.NeoHookean(c10=1.0), False), (fx.NeoHookean(c10=fx.table(HOT)), True),
+    (fx.Viscoelastic(fx.NeoHookean(c10=1.0), [(1.0, 1.0)]), False),
+    (fx.Viscoelastic(fx.NeoHookean(c10=1.0), [(1.0, 1.0)], shift=fx.WLF(8.86, 101.6, 150.0)), True)])
+def test_a_temperature_without_effect_is_found(material, used):
+    assert ("it has no effect" in str(fx.check(scene(material, 150.0)))) != used
+
+
 SHEET = fx.ThermalProperties(conductivity=0.17, density=1050.0, heat_capacity=1800.0)      # SI
 
 

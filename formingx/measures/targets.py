@@ -105,6 +105,9 @@ class Target(NamedTuple):
     bind: Any
     signed: bool = True
 
+    def __repr__(self) -> str:
+        return f"Target({self})"
+
     def __str__(self) -> str:
         return f"{self.name.replace('_', ' ')} = {self.value:g}"
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..errors import InputError, as_points, count
+from ..errors import InputError, as_points, check_type, count
 from ..figures import Axes
 from ..findings import Finding, findings_at, worst_first
 from ..solve.state import State
@@ -276,6 +276,7 @@ class Path(States):
         Raises:
             InputError: the mesh is not a sheet, or the part does not reach the trim or a height.
         """
+        check_type("Path.part: units", units, Units | None, "a formingx.Units or None")
         return self._reader.part(state or self.last, density, trim, heights, units or NONE)
 
     def filling(self, tool: Any = None) -> Any:

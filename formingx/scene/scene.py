@@ -10,7 +10,6 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from mpi4py import MPI
 
 from ..errors import InputError, as_list, call_on_all_ranks, check_name, count
 from ..materials.constants import OfMesh, Sample
@@ -25,7 +24,7 @@ from ..physics.loads import Load
 from ..physics.models import Membrane, MixedPressure, Model
 from ..physics.part import Part
 from ..physics.supports import Support
-from . import contact_checks, support_checks
+from . import boundary_checks, contact_checks, support_checks
 from .sampling import sample
 from .summary import summary
 from .symmetry import NO_PLANES, MirrorPlanes, mirror_planes
@@ -145,7 +144,7 @@ class Scene:
                              f" already")
         self._check_names()
         self._check_materials()
-        self._check_boundaries()
+        boundary_checks.check(self)
         if (planes := mirror_planes(self)).planes:
             self.symmetry = planes
         self.check_constrained(self.supports)
@@ -400,16 +399,6 @@ class Scene:
         """
         check_name("Scene: layer", layer, self._moduli)
         return self._moduli[layer]
-
-    def _check_boundaries(self) -> None:
-        """Raise an InputError unless the boundary of each item exists and has facets."""
-        for item in self.items:
-            on = item.on
-            if on is None:
-                continue
-            check_name(f"{item!r}: boundary", on, self.mesh.boundaries)
-            if self.mesh.comm.allreduce(len(self.mesh.facets_of(on)), MPI.SUM) == 0:
-                raise InputError(f"{item!r}: boundary {on!r} is empty: no facet of the mesh carries it")
 
     def check_travel(self, contact: Contact, travel: float) -> None:
         """Check that a tool does not pass through a constrained boundary.

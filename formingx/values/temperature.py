@@ -123,7 +123,7 @@ class Arrhenius:
     temperature, both in the unit `unit`.
 
     Args:
-        activation_energy: activation energy E, J/mol, above 0.
+        activation_energy: activation energy E, J/mol, at least 1000; melts have 2e4 to 4e5.
         reference: reference temperature Tr, in the unit of `unit`.
         unit: unit of the temperatures of the scene, "C" or "K".
 
@@ -135,6 +135,9 @@ class Arrhenius:
     def __init__(self, activation_energy: float, reference: float, *, unit: str):
         check_name("Arrhenius: unit", unit, ABSOLUTE_ZERO)
         self.activation_energy, self.unit = positive("Arrhenius: activation_energy", activation_energy), unit
+        if self.activation_energy < 1000:
+            raise InputError(f"Arrhenius: activation_energy = {activation_energy!r}: must be in J/mol, at least 1000"
+                             f" (melts have 2e4 to 4e5)")
         self.reference = finite("Arrhenius: reference", reference)
         _difference(self, self.reference, ABSOLUTE_ZERO[unit], "absolute zero")
 

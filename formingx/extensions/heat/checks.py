@@ -182,6 +182,25 @@ def implausible_units(body: Any) -> Iterator[Finding]:
         yield Finding("warning", "heat", text)
 
 
+@register("scene")
+def unused_temperature(body: Any) -> Iterator[Finding]:
+    """Find a temperature on which nothing in the scene depends.
+
+    Args:
+        body: the examined body, with its `scene`.
+
+    Yields:
+        A warning if there is such a temperature.
+    """
+    scene = body.scene
+    constants = [value for material in scene.materials.values() for value in material.constants().values()]
+    if not (scene.temperature is None or scene.heat is not None or scene.expansion
+            or any(contact.friction_by_temperature for contact in scene.contacts)
+            or any(isinstance(value, OfTemperature) for value in constants)):
+        yield Finding("warning", "temperature", "no constant of a material, no friction and no expansion depends on it,"
+                      " so it has no effect: give constants as table({T: value}) or of_temperature(f), or leave it out")
+
+
 @register("start")
 def implausible_expansion(body: Any) -> Iterator[Finding]:
     """Find lengths that change by more than 20 % between the stress-free temperature and a temperature of the body.
