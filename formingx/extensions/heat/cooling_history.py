@@ -147,7 +147,8 @@ class CoolingHistory:
     def findings(self, states: Sequence[Any]) -> list[Finding]:
         """Return a warning if the mesh is too coarse for the temperatures of a run; collective.
 
-        The error is estimated in at most eight states and at the ends of stages.
+        The error is estimated in at most eight states and at the ends of stages. At the end of a contact that moves on
+        it decays, so there it counts at the ends of stages only.
 
         Args:
             states: accepted states, in order.
@@ -158,11 +159,11 @@ class CoolingHistory:
         states = [state for state in states if state.time > 0]
         if not states:
             return []
-        begun = [k + 1 for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage]
-        looked = sorted({*np.linspace(0, len(states) - 1, EXAMINED_STATES).astype(int).tolist(),
-                         *(k - 1 for k in begun)})
+        last = [k for k, (a, b) in enumerate(zip(states, states[1:])) if a.stage != b.stage] + [len(states) - 1]
+        looked = sorted({*np.linspace(0, len(states) - 1, EXAMINED_STATES).astype(int).tolist(), *last})
         looked = [k for j, k in enumerate(looked) if not j or states[k].time > states[looked[j - 1]].time]
-        errors, ends_of_contact = zip(*self._space_errors([states[k] for k in looked]))
+        found = self._space_errors([states[k] for k in looked])
+        errors = [error if k in last or not end else 0.0 for k, (error, end) in zip(looked, found)]
         temperatures = [states[k].history_variables[-1].temperature for k in looked]      # the temperature is last
         scene, comm = self._problem.scene, self._problem.comm
         ends = listed(comm, [float(f(T)) for T in temperatures for f in (np.min, np.max) if len(T)])
@@ -173,7 +174,7 @@ class CoolingHistory:
             return []
         low, high = self._cooling.extremes(scene)
         most = max(span, high - low) if np.isfinite(high - low) else span          # no error is larger
-        about, end = float(f"{errors[worst]:.2g}"), ends_of_contact[worst]
+        about, end = float(f"{errors[worst]:.2g}"), found[worst][1]
         error = f"is about {about:g}" if errors[worst] < most else f"may be the whole span, {most:.3g}"
         advice = ("use shorter elements along the face there; thinner ones do not reduce this error" if end else
                   f"use thinner elements at faces that touch a tool or lose heat"
