@@ -220,9 +220,9 @@ class EnergyBalance:
         with problem.state_context(state) as p:
             fields, n = p.x.array_r.copy(), p.n_owned
             e, d = DIFFERENCE_STEP, state.direction
-            forward, backward = (p.body_forces(fields + sign * e * d, state.control + sign * e * state.slope)
-                             for sign in (1, -1))
-            change = scale * (forward - backward)[:n] / (2 * e)
+            back = 0 if p.body_has_history and p.setting.rate[-1] else 1        # a material relaxes forwards in time
+            before, after = (p.body_forces(fields + k * e * d, state.control + k * e * state.slope) for k in (-back, 1))
+            change = scale * (after - before)[:n] / ((1 + back) * e)
             free = change.copy()
             free[p.constrained] = 0                        # constrained unknowns
             for i, item in self._driven:
