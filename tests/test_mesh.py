@@ -280,3 +280,10 @@ boundaries: axis (2 edges), rim (2 edges), bottom (6 edges), top (6 edges)"""
     lines = str(scene).splitlines()
     assert lines[0].startswith("mesh               24 six-node triangles, 2 by 0.3 (R, Z); layers: a, b; boundaries: ")
     assert {"material of b      NeoHookean(c10=1.0)", "load 1             Pressure('bottom') (driven)"} <= set(lines)
+
+
+def test_a_mesh_prints_no_round_off():
+    """The axis of a body that was meshed anew is at R = 0."""
+    path = fx.trace(treloar((6, 1)), until=fx.pole_height(0.6), progress=False)
+    for mesh in (path.deformed_mesh(), path.deformed_mesh(size=0.05)):
+        assert "R from 0 to" in str(mesh)

@@ -89,7 +89,9 @@ class Mesh:
         edges = {name: f" ({len(self.facets_of(name))} edges)" if serial else "" for name in self.boundaries}
         lines = [f"{cells} six-node triangles"]
         if serial:
-            (r, z), (R, Z) = (f(self.domain.geometry.x[:, :2], axis=0) for f in (np.min, np.max))
+            x = self.domain.geometry.x[:, :2]
+            ends = np.array([x.min(axis=0), x.max(axis=0)])
+            (r, z), (R, Z) = np.where(abs(ends) > 1e-12 * np.ptp(x), ends, 0.0)         # without round-off
             lines[0] += f", R from {r:.6g} to {R:.6g}, Z from {z:.6g} to {Z:.6g}"
         return "\n".join([*lines, f"layers: {', '.join(self.layers)}",
                           f"boundaries: {', '.join(name + of for name, of in edges.items())}"])

@@ -15,6 +15,7 @@ from ...ranks import gathered
 from ...scene.tool_width import CUT
 from ...solve.state import State
 from ...values.tolerances import DIFFERENCE_STEP, FAR, LARGE_ERROR, NEGLIGIBLE, WARNED_ERROR
+from ..numbers import without_round_off
 
 
 @dataclass(frozen=True)
@@ -65,7 +66,7 @@ class Depth(NamedTuple):
     @property
     def words(self) -> str:
         """Depth, tool and position of a contact point in three dimensions, as a sentence without a full stop."""
-        position = ", ".join(f"{v:.5g}" for v in self.place)
+        position = ", ".join(f"{v:.5g}" for v in without_round_off(self.place, self.place))
         return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({position})"
 
 
