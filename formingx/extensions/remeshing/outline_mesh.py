@@ -8,6 +8,7 @@ import numpy as np
 from ...errors import InputError
 from ...forms.outline import FINE_PIECES
 from ...mesh import with_gmsh
+from ...mesh.check import crossing_point
 from ...mesh.grid import Grid, to_mesh
 from ...mesh.mesh import Mesh
 
@@ -39,7 +40,7 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
         The mesh.
 
     Raises:
-        InputError: gmsh made no mesh.
+        InputError: the outline of the new elements crosses itself, or gmsh made no mesh.
     """
     turns = [k for k in range(len(edges)) if names[k] != names[k - 1] or (corners == edges[k, 0]).all(1).any()] or [0]
     ends, middles, named = [], [], []
@@ -52,6 +53,10 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
         named += [boundary] * len(between)
     ring, middle = np.concatenate(ends), np.concatenate(middles)
     n = len(ring)
+    following = np.column_stack([np.arange(n), np.roll(np.arange(n), -1)])
+    if (place := crossing_point(ring, following)) is not None:          # gmsh might not end
+        raise InputError(f"remesh: the outline of the body crosses itself with elements of this size near (r, z) ="
+                         f" ({place[0]:.5g}, {place[1]:.5g}): take a smaller Remesh(corner=) or Remesh(size=)")
     try:
         with with_gmsh.model("body") as gmsh:
             geo = gmsh.model.geo
