@@ -38,12 +38,12 @@ def body(name, **given):
     return (fx.mesh.parison if name == "bottle" else fx.mesh.disc)(**BODIES[name], **given)
 
 
-def in_mould(mesh, material, tool, pressure, kinematics=None, friction="stick"):
+def in_mould(mesh, material, tool, pressure, kinematics=None, friction="stick", step=None, nodes_per_step=None):
     """Return the path of a sheet that is blown into a mould above it, up to a pressure."""
     scene = fx.Scene(mesh=mesh, materials=material, kinematics=kinematics,
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
-                     contacts=[fx.Contact("top", tool, friction)])
-    return fx.trace(scene, until=fx.pressure(pressure), progress=False)
+                     contacts=[fx.Contact("top", tool, friction, nodes_per_step=nodes_per_step)])
+    return fx.trace(scene, until=fx.pressure(pressure), step=step, progress=False)
 
 
 def cup(mesh, kinematics=None, friction="stick"):

@@ -48,7 +48,10 @@ def step(draw, R, h, lip):
 
 
 def scene(seed):
-    """Return a name of the scene of a seed, a function of its mesh that returns the path, and arguments of `disc`."""
+    """Return a name of the scene of a seed, a function of its mesh that returns the path, and arguments of `disc`.
+
+    The function takes `step` and `nodes_per_step`, too.
+    """
     numbers = random.Random(seed)
     draw, choose = numbers.uniform, numbers.choice
     R, shape = choose([12.0, 45.0, 80.0]), choose([cup, cup, bowl, step, step, narrow])
@@ -56,8 +59,8 @@ def scene(seed):
     kinematics, lip = choose([None, None, fx.PlaneStrain()]), R * draw(0.03, 0.1)
     tool, pressure = shape(draw, R, h, lip), (1.5 if shape is narrow else 1.0) * h / R * draw(8, 18)
 
-    def run(mesh):
-        return in_mould(mesh, material, tool, pressure, kinematics, friction)
+    def run(mesh, **steps):
+        return in_mould(mesh, material, tool, pressure, kinematics, friction, **steps)
     plane = ", plane" if kinematics else ""
     name = f"{shape.__name__}, R {R:g}, h/R {h / R:.2g}, {type(material).__name__}, {friction}{plane}"
     return name, run, {"radius": R + 0.9 * lip, "thickness": h}

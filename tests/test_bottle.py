@@ -17,10 +17,13 @@ def bottle(room, elements=60):
 
 
 def test_a_tube_that_stands_on_its_mould_buckles():
-    """At the maximum of the volume no state of a larger one follows; the run does not go back over what it passed."""
+    """At the maximum of the volume no state of a larger one follows; the run does not go back over what it passed.
+
+    A step of other lengths may skip the pressure's limit point, whose branches are .003 apart in arc length.
+    """
     ended = "the enclosed volume has a limit point here|the body folds"
     with pytest.raises(fx.ConvergenceError, match=ended) as caught:
-        fx.trace(bottle(3.5), until=fx.pressure(0.1), step=fx.StepControl(target=12), progress=False)   # with a jump
+        fx.trace(bottle(3.5, 80), until=fx.pressure(0.1), step=fx.StepControl(target=8), progress=False)   # with a jump
     path, found, said = caught.value.path, caught.value.diagnosis, str(caught.value)
     volume = path["enclosed_volume"]
     assert volume[-1] > 0.9999 * volume.max() and volume.argmax() >= len(volume) - 2

@@ -44,12 +44,9 @@ REFUSED = [
         ({"elements": (0, 1)}, "elements along the radius = 0.*at least 1"),
         ({"elements": (4, 1.5)}, "elements.*1.5.*whole number"),
         ({"elements": 4}, "elements = 4.*along the radius"),
-        ({"accuracy": "fine"}, r"accuracy = 'fine' and elements = \(.*\): give one of them"),
         ({"grading": 0}, "grading = 0.*greater than 0"),
         ({"inner_radius": 2.0}, "inner_radius = 2.0.*below radius"),
         ({"thickness": {"a": 1, "b": 1}, "elements": (4, (1, 1, 1))}, "2 layers need as many")]),
-    (lambda: fx.mesh.parison(inner_radius=1.0, thickness=0.1, length=2.0, elements=(9, 1), accuracy="draft"),
-     "give one of them"),
     *of(lambda change: scene(**change), [
         ({"loads": [fx.Pressure("axis")]}, r"Pressure\('axis'\): .* lies on the axis R = 0 and has no area"),
         ({"contacts": [fx.Contact("axis", CUP)]}, "Contact.*'axis'.* lies on the axis R = 0 and has no area"),

@@ -36,8 +36,8 @@ def test_walls_do_not_depend_on_the_steps(fine, target, close, caplog):
     path = pushed(step=fx.StepControl(target=target))
     assert path.profile().thickness == pytest.approx(fine.profile().thickness, rel=close)
     assert not path.jumps and path.counts.iterations < 400
-    assert "stuck again elsewhere, most near R = 2.0667: walls near there depend on the steps, by up to 0.6" in (
-        caplog.text)
+    found = [finding for finding in path.findings() if "stuck again elsewhere, most near R = 2.0667" in finding.text]
+    assert [finding.severity for finding in found] == ["note"] and "stuck again" not in caplog.text
 
 
 def over_lip(**options):
@@ -60,8 +60,8 @@ def test_a_step_ends_before_the_closures_after_a_separation(caplog):
     assert "2 points that stuck to 'top' lifted off" in caplog.text
 
 
-def test_estimated_wall_error_of_points_that_stick_again(fine):
-    """Zero where points stick once; else about the change of the wall by steps that are too long."""
+def test_shift_of_points_that_stick_again(fine):
+    """None where points stick once; else a bound of the change of the wall by other steps."""
     item = resticking.furthest(fine)
     assert 5e-3 < item.shift < 1e-2 and item.tool == "top" and resticking.findings(item)
     assert resticking.findings(item._replace(shift=2e-3)) == []
@@ -136,3 +136,25 @@ def test_a_failed_run_names_the_sticking_plug_as_cause():
         blown_off("stick", material, 22.0, 0.09, accuracy="standard")
     assert "friction=1 in place of 'stick'" in failed.value.diagnosis.advice
     assert blown_off(1.0, material, 22.0, 0.09, accuracy="standard").counts.steps < 50
+
+
+def in_bowl(nodes_per_step=None):
+    """A sheet of 48.6 x 0.56 in a bowl, in plane strain: it bends over a lip, and separates from it."""
+    h = 0.561
+    bowl = fx.tools.Tool([(0.0, 18.06 + h), (15.75, 18.06 + h), (36.0, 8.127 + h), (45.0, h), (135.0, h)],
+                         [0.0, 11.25, 9.0, 4.005, 0.0])
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=48.605, thickness=h),
+                     materials=fx.Ogden(mu=[0.5, 0.05], alpha=[1.6, 4.0]), kinematics=fx.PlaneStrain(),
+                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
+                     contacts=[fx.Contact("top", bowl, nodes_per_step=nodes_per_step)])
+    return fx.trace(scene, until=fx.pressure(0.1754), progress=False)
+
+
+def test_predicted_closures_beside_a_clamp_are_in_equilibrium():
+    """A point on a lip hardly moves along it: its position agrees long before the body is in equilibrium.
+
+    Before, it stuck at a wrong place, a point near it did not separate, and the wall there was wrong by 1.3 %.
+    """
+    path, one_by_one = in_bowl(), in_bowl(1)
+    assert path.profile().thickness == pytest.approx(one_by_one.profile().thickness, rel=1e-3)
+    assert path.counts.steps < 0.5 * one_by_one.counts.steps

@@ -83,8 +83,6 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
         raise InputError(f"disc: inner_radius = {inner_radius!r}: must be at least 0 and below radius = {radius!r}")
     sides = ("axis" if inner_radius == 0 else "inner", "rim", "bottom", "top")
     check_name("disc: accuracy", accuracy, ACCURACY)
-    if elements is not None and accuracy != "standard":
-        raise InputError(f"disc: accuracy = {accuracy!r} and elements = {elements!r}: give one of them")
     layers = layer_thicknesses("disc", thickness, "sheet", "R")
     chosen = elements is None and concentrate is None and grading == 1
     if elements is None:
@@ -278,8 +276,6 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     layers = layer_thicknesses("parison", thickness, "wall", "Z")
     if accuracy is not None:
         check_name("parison: accuracy", accuracy, ACCURACY)
-        if elements is not None:
-            raise InputError(f"parison: accuracy = {accuracy!r} and elements = {elements!r}: give one of them")
     chosen = accuracy is not None and elements is None and grading == 1
     along, through = divisions("parison", "meridian", (60, 2) if elements is None else elements, len(layers))
     if along < 2:

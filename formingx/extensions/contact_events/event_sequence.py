@@ -22,7 +22,7 @@ from mpi4py import MPI
 from ...contact.gap_closures import crossing, gap_closures
 from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
-from ...values.tolerances import FAR
+from ...values.tolerances import FAR, LARGE_ERROR
 from .gap_closure import GapClosure
 from .path_segment import PathSegment
 from .reduced_contact import Points, ToolFrame
@@ -44,6 +44,8 @@ class EventSettings:
             follow from the stiffness in the factorised tangent instead of Coulomb's law.
         sticking_tolerance: convergence tolerance of the position of a point that sticks, over its tributary length.
         sliding_tolerance: convergence tolerance of the position of a point that may slide, over its tributary length.
+        arc_length_tolerance: convergence tolerance of the arc length of a gap closure, over its distance from the last
+            event. A point near a constrained end hardly moves along its tool, so its position alone says little.
         simultaneous_fraction: fraction of the step within which two closures count as simultaneous.
         max_replacements: maximum number of times that an earlier closure replaces the one being located.
         max_arc_length_change: largest relative change of the arc length of an event in one equilibrium iteration.
@@ -58,6 +60,7 @@ class EventSettings:
     max_sliding_points: int = 80
     sticking_tolerance: float = 1e-3
     sliding_tolerance: float = 1e-2
+    arc_length_tolerance: float = LARGE_ERROR
     simultaneous_fraction: float = 0.02
     max_replacements: int = 3
     max_arc_length_change: float = 1.0
@@ -333,7 +336,8 @@ class ContactEventSequence:
         for _ in range(_SETTINGS.max_iterations * _SETTINGS.max_replacements):
             if len(tried) == _SETTINGS.max_iterations or self.exhausted:
                 return False
-            closure, moved = self._closures[-1], self._iterated(closure.arc_length, end)
+            closure = self._closures[-1]
+            moved = self._iterated(closure.arc_length, end)
             if moved is None:
                 return False
             found = self._closure(*closure.point_id, closure.arc_length, moved.positions)
@@ -348,7 +352,9 @@ class ContactEventSequence:
                 return False
             self._closures[-1], self._end = found, (end := end.after(found.arc_length))
             near = (_SETTINGS.sticking_tolerance if found.sticks else _SETTINGS.sliding_tolerance) * found.length
-            if np.linalg.norm(found.place - closure.place) < near:
+            settled = abs(found.arc_length - closure.arc_length) < _SETTINGS.arc_length_tolerance * (
+                closure.arc_length - last.begins)
+            if settled and np.linalg.norm(found.place - closure.place) < near:
                 arc_lengths = self._missed(end, last, found)
                 if not self._store_first(arc_lengths, found.arc_length, end):
                     return True

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
+from ...contact.face import FaceContact
 from ...findings import Finding, register
 from ...ranks import combined
 from ...values.tolerances import LARGEST_FRICTION
@@ -39,8 +40,8 @@ def strongest(problem: Any, states: Sequence[Any]) -> Peeling | None:
     found = []
     for state in states:
         with problem.state_context(state):
-            for face in problem.contacts:
-                if face.active and face.contact.sticks and face.contact.separates and not face.contact.lagged:
+            for face in (face for face in problem.active_contacts if isinstance(face, FaceContact)):
+                if face.contact.sticks and face.contact.separates and not face.contact.lagged:
                     tractions = face.tractions(state.x[:problem.n_owned], state.control)
                     both = np.array([face.area @ np.abs(tractions.tangential), face.area @ tractions.normal])
                     along, normal = combined(face.comm, both, MPI.SUM)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, finite
+from ...errors import InputError, finite, finite_array
 from ...forms.probes import Probe, probe
 from ...mesh.nodes import SAME_PLACE
 from ...mesh.sizes import length_along
@@ -125,8 +125,12 @@ class Profile:
 
         Args:
             fractions: position between bottom (0) and top (1), shape (m,).
+
+        Raises:
+            InputError: a fraction that is not a finite number.
         """
-        s = np.asarray(fractions)[:, None, None]
+        fractions = finite_array("through_wall: fractions", fractions).ravel()
+        s = fractions[:, None, None]
         straight = (1 - s) * self.bottom + s * self.top
         found = straight.copy()
         for edge, k, weight in zip((self.start, self.end), (0, -1), self.end_weights):
