@@ -63,3 +63,15 @@ def test_ctrl_c_while_it_is_imported(error, lines):
 def test_importing_restores_the_exception_hook():
     script = "import sys, formingx; sys.exit(sys.excepthook is not sys.__excepthook__)"
     assert subprocess.run([sys.executable, "-c", script], cwd=ROOT).returncode == 0
+
+
+def test_a_run_whose_steps_grow_is_not_given_up():
+    """Of 501 states that gained less than 1e-3, the last half gained more: a slow ramp that began with short steps."""
+    def stalled(values):
+        targets = object.__new__(progress.RunTargets)
+        targets.values, targets.until = values, fx.pressure(1.0)
+        return targets.stalled()
+    assert stalled([1e-4 * k / 500 for k in range(501)]) and stalled([0.0] * 501)
+    assert stalled([-1e-7 * k for k in range(501)])
+    assert not stalled([1e-4 * 1.01 ** (k - 500) for k in range(501)])
+    assert not stalled([2e-3 * k / 500 for k in range(501)])

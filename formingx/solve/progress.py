@@ -171,10 +171,13 @@ class RunTargets:
         return ""
 
     def stalled(self) -> str:
-        """Return a reason to give up if the last `patience` states came no nearer to the last target, else ""."""
+        """Return a reason to give up if the last `patience` states came no nearer to the last target, else "".
+
+        The run goes on if their second half gained more than twice as much as their first half: its steps grow.
+        """
         if len(self.values) > self.patience:
-            now, then = (self.gained(self.values[k]) for k in (-1, -1 - self.patience))
-            if abs(now - then) < 1e-3:
+            now, between, then = (self.gained(self.values[-1 - k]) for k in (0, self.patience // 2, self.patience))
+            if abs(now - then) < 1e-3 and now - between <= 2 * abs(between - then):
                 return f"the last {self.patience} states came no nearer to the target"
         return ""
 
