@@ -471,3 +471,17 @@ def test_a_state_of_the_path_that_meets_a_target_is_found(there_and_back):
         path.state_at(fx.travel(1.5), after=State(np.zeros(1), 0.0, np.zeros(1), 0.0))
     with pytest.raises(fx.InputError, match="column 'travel' is not known"):
         path.curve("travel")
+
+
+def test_a_measure_in_amplitudes_needs_a_control():
+    with pytest.raises(fx.InputError, match="enclosed_volume is an output quantity: give control="):
+        fx.Stage("a", amplitudes={fx.enclosed_volume: [(0.0, 0.0), (1.0, 100.0)]})
+
+
+def test_a_tool_whose_name_has_a_space_has_one_column_of_force():
+    tools = [fx.Contact("top", fx.tools.sphere(radius=9.0, z=0.5), direction=(0, -1), name="plug 1"),
+             fx.Contact("bottom", fx.tools.plane(-5.0).reversed(), name="mould")]
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=20.0, thickness=0.5, elements=(8, 1)), materials=fx.NeoHookean(c10=0.3),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], contacts=tools)
+    path = fx.Process(scene).run([fx.Stage("a", control="plug 1", until=fx.travel(1.0))], progress=False)
+    assert [column for column in path.columns if "force" in column] == ["plug 1_force", "mould_force"]

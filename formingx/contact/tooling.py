@@ -62,8 +62,9 @@ class Tooling(NamedTuple):
 
         The force on the only tool is in "tool_force". Of several tools, the force on "plug" is in "plug_force".
         """
-        names = list(dict.fromkeys(self.names))
-        return {name: "tool_force" if len(names) == 1 else f"{name}_force".replace(" ", "_") for name in names}
+        given, names = {c.name for c in self.contacts}, list(dict.fromkeys(self.names))
+        return {name: "tool_force" if len(names) == 1 else
+                f"{name if name in given else name.replace(' ', '_')}_force" for name in names}
 
     def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
         """Return the travel of each tool in a state.

@@ -349,7 +349,7 @@ def _limit_point_findings(run: FailedRun) -> Iterator[Finding]:
         yield Finding("serious", "limit point",
                       f"the {what} has its {extremum}, {max(limits, key=abs):.6g}, at a limit point that was passed,"
                       f" and the target {target:.6g} lies {side} it",
-                      "a target that goes on growing past a limit point (pole_height, pole_stretch, enclosed_volume)")
+                      "a target that goes on growing past a limit point, such as enclosed_volume")
     ahead, aimed = facts.get("next_limit_point"), facts.get("aimed")
     if ahead is not None and run.fixed_control:
         yield Finding("warning", "limit point",

@@ -187,6 +187,9 @@ class Stage:
             raise InputError(f"{self.label}: amplitudes = {amplitudes!r}: must be {{item: [(time, value), ...]}}")
         tables = []
         for item, knots in amplitudes.items():
+            if callable(item) and self.control is None:
+                raise InputError(f"{self.label}: amplitudes: {getattr(item, '__name__', item)} is an output quantity:"
+                                 f" give control=..., the load or tool that changes so that it follows its table")
             table = f"{self.label}: the table of {item!r}"
             rows = [as_list(table, row, "two numbers") for row in as_list(table, knots, "(time, value)")]
             if not rows or any(len(row) != 2 for row in rows):
