@@ -46,3 +46,17 @@ def test_thin_sheets_start_though_their_stresses_cancel_in_round_off(material):
                          supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
         found.append(fx.trace(scene, until=fx.pole_stretch(1.5), progress=False)["pressure"][-1] / thickness)
     assert found[1] == pytest.approx(found[0], rel=2e-6)
+
+
+def test_a_film_that_slides_over_a_lip_starts_towards_its_target():
+    """At r0/h0 = 1e5 round-off turns the first tangent; the pressure grows all the same, as that of a thicker film."""
+    pressures = []
+    for thickness in (1e-2, 1e-4):
+        cup = fx.tools.cup(radius=8.5, depth=4.5, mouth=thickness, fillet=2.5, lip=1.2, draft=6.0)
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=thickness, elements=(24, 1)),
+                         materials=fx.NeoHookean(c10=0.5), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                         loads=[fx.Pressure("bottom")], contacts=[fx.Contact("top", cup, 0.3)])
+        path = fx.trace(scene, until=fx.pole_height(2.0), progress=False)
+        assert path["pressure"][1] > 0
+        pressures.append(path["pressure"][-1] / thickness)
+    assert pressures[1] == pytest.approx(pressures[0], rel=5e-3)

@@ -226,7 +226,8 @@ class StateSolver:
                 self._x, state.control, one_sided=True):
             size = self._length_of(self.newton.b)
             direction, slope = self.newton.b.array_r / size, 1 / size
-            sense = np.sign(self._inner(direction, slope, state.direction, state.slope)) or 1.0
+            sense = np.sign(state.slope if state.kind == "start" else        # round-off may turn a film's displacements
+                            self._inner(direction, slope, state.direction, state.slope)) or 1.0
             state.direction, state.slope = sense * direction, sense * slope
             self._one_sided_state = state, self.newton.solver.count
 
