@@ -96,6 +96,7 @@ class Approach:
         share = max(self.points // 100, 1) if face.contact.lagged else 1
         self.max_closures = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
         self._predicted_closures = 0                        # number in the step, on all ranks
+        self._bonds = np.ones(len(face.rule.points))        # parts of the step after which points are to be bonded
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
         """Return True if any point of the face is in contact with the tool.
@@ -182,6 +183,8 @@ class Approach:
         """
         face = self.face
         self._predicted_closures = combined(self._comm, int(np.sum(arc_lengths < length)), MPI.SUM)
+        if face.law.adhesive:
+            self._bonds = np.where(False if guessed is None else guessed, arc_lengths / length, 1.0)
         if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
             at_end = ends & face.contact.sticks & (arc_lengths >= LIMITS.friction_fraction * length)
             if speeds is not None and at_end.any():
@@ -384,6 +387,24 @@ class Approach:
             places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
             found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
         return bool(combined(self._comm, found, MPI.LOR))
+
+    def fraction_to_lost_bond(self, new: np.ndarray, control: float) -> float:
+        """Return the fraction of a step at which the first gap closes whose point is open at the end of the step.
+
+        A point that cannot separate is bonded from the next accepted state on. If it comes under tension in the same
+        step, it opens; the step should therefore end at its gap closure.
+
+        Args:
+            new: locally owned unknowns at the end of the step, shape (n,).
+            control: load parameter (control) at the end of the step, dimensionless.
+
+        Returns:
+            Fraction of the arc length up to the first such gap closure; 1 without such points.
+        """
+        if not self.face.law.adhesive:
+            return 1.0
+        open_ = ~self.face.touching(new, control)
+        return float(combined(self._comm, float(self._bonds[open_].min(initial=1.0)), MPI.MIN))
 
     def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
                                length: float) -> float:

@@ -265,6 +265,9 @@ class StepLimit:
         if length > LIMITS.min_mixed_length and any([c.opens_and_closes(new.x[:n], new.control) for c in contacts]):
             return StepRejection("points lift off while others come into contact", 0.5)
         if ends and length > LIMITS.min_length:
+            part = min([c.fraction_to_lost_bond(new.x[:n], new.control) for c in contacts], default=1.0)
+            if part < 1:
+                return StepRejection("gap closure", min(LIMITS.overshoot * part, 1.0))
             part = min([c.fraction_to_wrong_slip(new.x[:n], new.control, new.direction[:n], new.slope, length)
                         for c in contacts], default=1.0)
             if part < 1:
