@@ -29,6 +29,7 @@ class Fineness(NamedTuple):
         even: distance from a constrained end up to which the columns have their shortest length, over the thickness.
         height: largest height over length of an element on a fillet, both in the reference configuration.
         promised: largest relative error of the wall.
+        target: estimated error for which the elements are chosen. The estimate may be a fifth too low.
     """
 
     along: int
@@ -37,10 +38,11 @@ class Fineness(NamedTuple):
     even: float
     height: float
     promised: float
+    target: float
 
 
-FINENESS = {"draft": Fineness(16, 1, 6, 0.0, 4.0, 0.03), "standard": Fineness(20, 2, 8, 0.0, 5.0, 0.01),
-            "fine": Fineness(32, 3, 12, 1.0, 5.0, 0.003)}
+FINENESS = {"draft": Fineness(16, 1, 6, 0.0, 4.0, 0.03, 0.03), "standard": Fineness(20, 2, 8, 0.0, 5.0, 0.01, 0.01),
+            "fine": Fineness(32, 3, 12, 1.0, 5.0, 0.003, 0.0024)}
 """Element sizes of each accuracy: benchmarks/accuracy_in_moulds.py measures the errors."""
 
 _THICKEST = 1 / 10
@@ -123,7 +125,7 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
                 inaccurate.append(_sharp_fillet(item, fillet, thickness, preset.accuracy, fineness))
         if item.direction is None:
             flats = flats_in_sheet(item.tool, faces[item.on], axisymmetric)
-            size = np.minimum(size, np.maximum(_on_flats(flats, s, thickness, fineness.promised), _SHORTEST * longest))
+            size = np.minimum(size, np.maximum(_on_flats(flats, s, thickness, fineness.target), _SHORTEST * longest))
     size, through = _fewest_unknowns(s, size, fillets, constrained, thickness, fineness)
     ends = ends_of_columns(coordinates, s, size, np.union1d(columns.fixed, columns.ends[[0, -1]]))
     return replace(preset.make(ends, _through_layers(preset, through, keep_through)), inaccurate=tuple(inaccurate))
@@ -133,8 +135,8 @@ def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[Fillet
                      constrained: list[float], thickness: float, fineness: Fineness) -> tuple[np.ndarray, int]:
     """Return the largest lengths of columns, shape (n,), and the number of elements through the sheet.
 
-    They are those with the fewest unknowns among all that keep the promised error on every fillet. If none does, the
-    number of elements through the sheet is the largest.
+    They are those with the fewest unknowns among all whose estimated error is small enough on every fillet. If there
+    are none, the number of elements through the sheet is the largest.
 
     Args:
         s: lengths along the sheet from its start to n points, shape (n,), length.
@@ -148,8 +150,8 @@ def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[Fillet
     for through in range(1, fineness.max_through + 1):
         errors, lengths, sizes = [0.0], [longest], [size]
         for fillet, inside, distance in fillets:
-            errors.append(_error_through(fillet, thickness, through, inside) / fineness.promised)
-            length = _column_length(fillet, fineness.promised * np.sqrt(max(1 - errors[-1] ** 2, 0.0)))
+            errors.append(_error_through(fillet, thickness, through, inside) / fineness.target)
+            length = _column_length(fillet, fineness.target * np.sqrt(max(1 - errors[-1] ** 2, 0.0)))
             lengths.append(max(length, _SHORTEST * longest))
             sizes.append(lengths[-1] + GROWTH * distance)
         for end in constrained:
