@@ -117,8 +117,8 @@ def test_elements_through_the_sheet_follow_the_sharpest_edge_inside_the_mould():
                             [0, 3.0, radius, radius, 3.0, 3.5, 1.0, 0])
         disc = fx.mesh.disc(radius=42.0, thickness=1.0, accuracy=accuracy)
         return columns(disc, contacts=[fx.Contact("top", rib)])[1][0]
-    assert [through(1.2, accuracy) for accuracy in moulds.PROMISED] == [2, 4, 6]
-    assert [through(2.0, accuracy) for accuracy in moulds.PROMISED] == [2, 3, 4]
+    assert [through(1.2, accuracy) for accuracy in moulds.PROMISED] == [2, 4, 7]
+    assert [through(2.0, accuracy) for accuracy in moulds.PROMISED] == [2, 3, 5]
 
 
 def test_a_sheet_that_is_thin_for_its_fillets_gets_one_element_through_it():
@@ -138,7 +138,7 @@ def test_elements_are_bounded_for_any_fillet(accuracy, fillet, thickness):
     mould = fx.tools.cup(radius=10.0, depth=5.0, mouth=thickness, fillet=fillet)
     ends, (through,) = columns(fx.mesh.disc(radius=10.0, thickness=thickness, accuracy=accuracy),
                                contacts=[fx.Contact("top", mould)])
-    assert len(ends) < 600 and through <= 12
+    assert len(ends) < 640 and through <= 12
 
 
 def test_edges_sharper_than_the_wall_and_thick_sheets_are_reported():
