@@ -249,9 +249,6 @@ def test_a_face_that_bridges_a_fillet_between_its_nodes_counts_as_touching():
         error, = path.problem.histories[-1].errors_in_space([path.last])
         assert error < 2.0                                       # of 130
     assert np.abs(found[0] - found[1]).max() < 2.0
-    warned = [float(re.search("about (.*?) degrees", finding.text).group(1)) for finding in path.findings()
-              if finding.about == "temperature"]
-    assert not warned or max(warned) < 2.0                       # ends of contacts that moved on are left out
 
 
 @pytest.mark.parametrize("change, message", [

@@ -96,7 +96,7 @@ class Approach:
         share = max(self.points // 100, 1) if face.contact.lagged else 1
         self.max_closures = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
         self._predicted_closures = 0                        # number in the step, on all ranks
-        self._bonds = np.ones(len(face.rule.points))        # parts of the step after which points are to be bonded
+        self._bonds: np.ndarray = np.ones(len(face.rule.points))      # part of the step after which each is bonded
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
         """Return True if any point of the face is in contact with the tool.
