@@ -74,14 +74,21 @@ def errors(run, sheet):
                        sum(found.severity != "note" for found in path.findings())) for accuracy, path in paths.items()}
 
 
-def main():
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--seeds", type=int, default=24, help="number of moulds")
-    options.add_argument("--first", type=int, default=101, help="first seed")
-    options.add_argument("--out", type=Path, default=Path("results/random_moulds"), help="folder for summary.json")
+def arguments(description, name, seeds, first):
+    """Return the arguments of a benchmark called `name`: seeds, a range of numbers, and out, the folder of its results.
+    """
+    options = argparse.ArgumentParser(description=description.splitlines()[0])
+    options.add_argument("--seeds", type=int, default=seeds, help="number of seeds")
+    options.add_argument("--first", type=int, default=first, help="first seed")
+    options.add_argument("--out", type=Path, default=Path("results", name), help="folder for summary.json")
     args = options.parse_args()
+    return range(args.first, args.first + args.seeds), args.out
+
+
+def main():
+    seeds, out = arguments(__doc__, "random_moulds", 24, 101)
     rows, over, reported = {}, [], 0
-    for seed in range(args.first, args.first + args.seeds):
+    for seed in seeds:
         name, run, sheet = scene(seed)
         rows[f"{seed}"] = found = errors(run, sheet)
         shown = [f"{text} {value:.2%}{'!' * (value > PROMISED[accuracy])}"
@@ -94,7 +101,7 @@ def main():
     walls = {seed: {accuracy: value for accuracy, (_, value, _) in row.items()} for seed, row in rows.items()}
     summary = {"moulds": len(rows), "runs": 3 * len(rows), "over": len(over), "reported": reported,
                "largest_ratio": max(over, default=1.0), "errors": walls}
-    files.write_summary(args.out / "summary.json", summary, MPI.COMM_WORLD)
+    files.write_summary(out / "summary.json", summary, MPI.COMM_WORLD)
     print({key: value for key, value in summary.items() if key != "errors"})
 
 

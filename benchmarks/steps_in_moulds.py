@@ -6,12 +6,9 @@ The moulds are those of `random_moulds.py`, with the elements of accuracy "stand
 difference of the wall at a node to the wall of a run with one node a step, in steps of at most `FINEST`.
 """
 
-import argparse
-from pathlib import Path
-
 import numpy as np
 from mpi4py import MPI
-from random_moulds import scene
+from random_moulds import arguments, scene
 
 import formingx as fx
 from formingx.results import files
@@ -29,13 +26,9 @@ def errors(run, sheet, targets=(4, 8)):
 
 
 def main():
-    options = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    options.add_argument("--seeds", type=int, default=100, help="number of seeds; some have no mould")
-    options.add_argument("--first", type=int, default=200, help="first seed")
-    options.add_argument("--out", type=Path, default=Path("results/steps_in_moulds"), help="folder for summary.json")
-    args = options.parse_args()
+    seeds, out = arguments(__doc__, "steps_in_moulds", 100, 200)
     found = {"stick": [], "friction": []}
-    for seed in range(args.first, args.first + args.seeds):
+    for seed in seeds:
         try:
             name, run, sheet = scene(seed)
         except fx.InputError:                                # its fillets do not fit
@@ -47,7 +40,7 @@ def main():
     summary = {kind: {"moulds": len(rows), "median": float(np.median(rows, axis=0)[0]),
                       "largest": float(np.max(rows, axis=0)[0]), "largest_target_8": float(np.max(rows, axis=0)[1])}
                for kind, rows in found.items() if rows}
-    files.write_summary(args.out / "summary.json", summary, MPI.COMM_WORLD)
+    files.write_summary(out / "summary.json", summary, MPI.COMM_WORLD)
     print(summary)
 
 

@@ -96,7 +96,7 @@ class Approach:
         share = max(self.points // 100, 1) if face.contact.lagged else 1
         self.max_closures = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
         self._predicted_closures = 0                        # number in the step, on all ranks
-        self._bonds: np.ndarray = np.ones(len(face.rule.points))      # part of the step after which each is bonded
+        self._bonded_from: np.ndarray = np.ones(len(face.rule.points))      # fraction of the step; 1: not in the step
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
         """Return True if any point of the face is in contact with the tool.
@@ -184,7 +184,7 @@ class Approach:
         face = self.face
         self._predicted_closures = combined(self._comm, int(np.sum(arc_lengths < length)), MPI.SUM)
         if face.law.adhesive:
-            self._bonds = np.where(False if guessed is None else guessed, arc_lengths / length, 1.0)
+            self._bonded_from = np.where(False if guessed is None else guessed, arc_lengths / length, 1.0)
         if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
             at_end = ends & face.contact.sticks & (arc_lengths >= LIMITS.friction_fraction * length)
             if speeds is not None and at_end.any():
@@ -389,10 +389,10 @@ class Approach:
         return bool(combined(self._comm, found, MPI.LOR))
 
     def fraction_to_lost_bond(self, new: np.ndarray, control: float) -> float:
-        """Return the fraction of a step at which the first gap closes whose point is open at the end of the step.
+        """Return the fraction of a step after which the first gap closes whose point is open again at its end.
 
-        A point that cannot separate is bonded from the next accepted state on. If it comes under tension in the same
-        step, it opens; the step should therefore end at its gap closure.
+        A point that cannot separate is bonded from the first accepted state after its gap closure on. A tension in the
+        step of the closure opens it. The step should therefore end at the closure.
 
         Args:
             new: locally owned unknowns at the end of the step, shape (n,).
@@ -403,8 +403,8 @@ class Approach:
         """
         if not self.face.law.adhesive:
             return 1.0
-        open_ = ~self.face.touching(new, control)
-        return float(combined(self._comm, float(self._bonds[open_].min(initial=1.0)), MPI.MIN))
+        opened = ~self.face.touching(new, control)
+        return float(combined(self._comm, float(self._bonded_from[opened].min(initial=1.0)), MPI.MIN))
 
     def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
                                length: float) -> float:

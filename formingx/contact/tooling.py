@@ -60,11 +60,13 @@ class Tooling(NamedTuple):
     def force_columns(self) -> dict[str, str]:
         """Column name of the contact force on each tool, {tool name: column}.
 
-        The force on the only tool is in "tool_force". Of several tools, the force on "plug" is in "plug_force".
+        The force on the only tool is in "tool_force". Of several tools, the force on "plug" is in "plug_force", and
+        the force on "tool 1", which has no name, in "tool_1_force".
         """
-        given, names = {c.name for c in self.contacts}, list(dict.fromkeys(self.names))
-        return {name: "tool_force" if len(names) == 1 else
-                f"{name if name in given else name.replace(' ', '_')}_force" for name in names}
+        names = self.names
+        if len(set(names)) == 1:
+            return {names[0]: "tool_force"}
+        return {name: f"{c.name or name.replace(' ', '_')}_force" for name, c in zip(names, self.contacts)}
 
     def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
         """Return the travel of each tool in a state.

@@ -13,7 +13,7 @@ from .. import _compat
 from ..errors import InputError, check_name, pair
 from ..ranks import gathered
 from .check import check_elements
-from .nodes import facet_node_positions, facet_nodes, own_cells
+from .nodes import facet_node_positions, facet_nodes, own_cells, without_round_off
 
 
 class Columns(NamedTuple):
@@ -90,8 +90,7 @@ class Mesh:
         lines = [f"{cells} six-node triangles"]
         if serial:
             x = self.domain.geometry.x[:, :2]
-            ends = np.array([x.min(axis=0), x.max(axis=0)])
-            (r, z), (R, Z) = np.where(abs(ends) > 1e-12 * np.ptp(x), ends, 0.0)         # without round-off
+            (r, z), (R, Z) = (without_round_off(point, x) for point in (x.min(axis=0), x.max(axis=0)))
             lines[0] += f", R from {r:.6g} to {R:.6g}, Z from {z:.6g} to {Z:.6g}"
         return "\n".join([*lines, f"layers: {', '.join(self.layers)}",
                           f"boundaries: {', '.join(name + of for name, of in edges.items())}"])

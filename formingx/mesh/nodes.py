@@ -70,6 +70,19 @@ def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndar
     return np.sqrt(np.take_along_axis(squares, numbers[..., None], -1)[..., 0]), numbers
 
 
+def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
+    """Return the coordinates of a point, with 0 in place of round-off.
+
+    Args:
+        point: the coordinates, length.
+        points: coordinates of points of the body, any shape, length; their range is the scale of round-off.
+
+    Returns:
+        The coordinates. Those with a magnitude of at most 1e-12 times that range are 0.
+    """
+    return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
+
+
 def matching_rows(points: np.ndarray, stored: Any, tolerance: float, message: str) -> np.ndarray:
     """Return the row of stored positions that coincides with each point, shape (n,).
 

@@ -2,24 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-import numpy as np
-
 from ..units import Units
-
-
-def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
-    """Return the coordinates of a point, with 0 in place of round-off.
-
-    Args:
-        point: the coordinates, length.
-        points: coordinates of points of the body, any shape, length; their range is the scale of round-off.
-
-    Returns:
-        The coordinates. Those with a magnitude of at most 1e-12 times that range are 0.
-    """
-    return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
 
 
 class KeyNumbers:

@@ -51,8 +51,7 @@ def check_start(scene: Any, contact: Contact) -> None:
         why = ("; the other side of its profile is free of it: use tool.reversed()" if free else
                "; on this side it must stand upside down: use tool.mirrored(), and moved(z=...) to its place"
                if _fits_upside_down(contact, face, points, near) else "; move it away from the body (tool.moved)")
-        plane = len(getattr(contact.tool, "pieces", ())) == getattr(contact.tool, "lines", 0) == 1      # without a size
-        if not (plane or length < OTHER_UNIT * size):
+        if getattr(contact.tool, "sized", True) and not length < OTHER_UNIT * size:
             why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"
                    f" and cm)?")
         raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="

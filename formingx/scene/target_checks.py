@@ -9,7 +9,6 @@ from ..errors import InputError
 from ..mesh.nodes import SAME_PLACE
 from ..mesh.triangles import Triangles
 from ..physics.supports import Constrained
-from ..tools.pieces import Line
 from ..values.tolerances import ROUND_OFF
 from .scene import Scene
 
@@ -117,10 +116,10 @@ def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
 
 def _is_plate(contact: Any) -> bool:
     """Return True if a tool is a plane normal to its direction: friction on it has no component along the direction."""
-    pieces: tuple[Any, ...] = getattr(getattr(contact.tool, "profile", contact.tool), "pieces", ())
-    if len(pieces) != 1 or not isinstance(pieces[0], Line):
+    profile: Any = getattr(contact.tool, "profile", contact.tool)
+    if getattr(profile, "sized", True):
         return False
-    a, b = pieces[0].ends
+    a, b = profile.pieces[0].ends
     return bool(a[1] == b[1]) and not any(contact.direction[:-1])
 
 

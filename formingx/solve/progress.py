@@ -176,8 +176,8 @@ class RunTargets:
         The run goes on if their second half gained more than twice as much as their first half: its steps grow.
         """
         if len(self.values) > self.patience:
-            now, between, then = (self.gained(self.values[-1 - k]) for k in (0, self.patience // 2, self.patience))
-            if abs(now - then) < 1e-3 and now - between <= 2 * abs(between - then):
+            first, middle, last = (self.gained(self.values[-1 - k]) for k in (self.patience, self.patience // 2, 0))
+            if abs(last - first) < 1e-3 and last - middle <= 2 * abs(middle - first):
                 return f"the last {self.patience} states came no nearer to the target"
         return ""
 

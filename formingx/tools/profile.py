@@ -57,6 +57,7 @@ class Tool:
         size: largest extent of the profile, or its largest arc radius if that is larger, length.
         table: numbers of the pieces for `formingx.tools.nearest.nearest`, lines first, shape (pieces, 9).
         lines: number of lines.
+        sized: False for a plane, which is a single line and has no end.
 
     Raises:
         InputError: fewer than two different points, a fillet without a corner or too large for it, or a profile that
@@ -154,6 +155,10 @@ class Tool:
             1/length.
         """
         return Nearest(*nearest(as_points("Tool: x", x), self.table, self.lines))
+
+    @property
+    def sized(self) -> bool:
+        return len(self.pieces) > 1 or isinstance(self.pieces[0], Arc)
 
     @property
     def compiled_table(self) -> tuple[int, int, Any]:

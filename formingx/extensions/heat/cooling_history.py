@@ -12,9 +12,8 @@ from ...errors import ConvergenceError, InputError
 from ...findings import Finding
 from ...forms.history import Start
 from ...forms.transfer import MovingLeastSquares
-from ...mesh.nodes import matching_rows
+from ...mesh.nodes import matching_rows, without_round_off
 from ...ranks import combined, gathered, listed
-from ...results.numbers import without_round_off
 from ...values.temperature import ABSOLUTE_ZERO
 from ...values.tolerances import EXAMINED_STATES, WARNED_ERROR
 from . import stepping

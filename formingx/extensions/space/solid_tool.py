@@ -128,7 +128,7 @@ class Swept(SolidTool):
     def __init__(self, profile: Tool, kind: str, half: tuple[float, float] = (0.0, 0.0), corner: float = 0.0,
                  along: str = "y"):
         self.profile, self.kind, self.half, self.corner, self.along = profile, kind, half, corner, along
-        self.sized = len(profile.pieces) > 1 or profile.closed
+        self.sized = profile.sized
 
     def distances(self, x: np.ndarray) -> Distances:
         """Return the signed distances of points from the tool, with exact first and second derivatives.

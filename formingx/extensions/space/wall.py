@@ -12,10 +12,9 @@ import numpy as np
 from ...errors import InputError, direction, pair, positive, triple
 from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.edges import edges_of
-from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
+from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells, without_round_off
 from ...ranks import gathered
 from ...results.files.column_table import ColumnTable
-from ...results.numbers import without_round_off
 from .surface import wrinkled
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ...errors import InputError, as_list, count, finite
+from ...mesh.nodes import without_round_off
 from ...ranks import gathered
 from ...results.extend import method_of
-from ...results.numbers import without_round_off
 from ...results.path import Path
 from ...results.show.picture import Picture
 from ...run_hooks import RunExtension

@@ -34,8 +34,7 @@ from ...results.files.column_table import ColumnTable
 from ...units import NONE, Units
 from ...values.tolerances import NEGLIGIBLE
 from . import effects, stored_runs
-from .task import Measure, StudyRun, Task, check_importable, completed_runs, executor_context
-from .task import as_text as named
+from .task import Measure, StudyRun, Task, as_text, check_importable, completed_runs, executor_context
 from .variables import sets_of_values
 
 
@@ -227,19 +226,19 @@ class Study(ColumnTable):
         Args:
             names: {name of a variable or measure: name in the text}.
         """
-        def as_text(values: Mapping[str, float]) -> str:
+        def renamed(values: Mapping[str, float]) -> str:
             """Return numbers with the names in the text."""
-            return named({names[name]: value for name, value in values.items()})
+            return as_text({names[name]: value for name, value in values.items()})
         failed = len(self.runs) - len(self.successful)
         lines = [f"{len(self.runs)} runs" + f", of which {failed} failed" * bool(failed)
                  + f", {sum(run.seconds for run in self.runs):.1f} s in all"]
         if self.goal and self.successful:
-            shown = as_text({**self.best.values, **self.best.measures})
+            shown = renamed({**self.best.values, **self.best.measures})
             lines.append(f"best ({', '.join(f'{direction} {names[name]}' for name, direction in self.goal.items())}):"
                          f" {shown}")
             lines += self._edge_warnings(names)
-        lines += [f"failed: {as_text(run.values)}: {run.error.splitlines()[0]}" for run in self.runs if run.error]
-        return "\n".join([*lines, *(f"warning: {as_text(run.values)}: {text}" for run in self.runs
+        lines += [f"failed: {renamed(run.values)}: {run.error.splitlines()[0]}" for run in self.runs if run.error]
+        return "\n".join([*lines, *(f"warning: {renamed(run.values)}: {text}" for run in self.runs
                                     for text in run.warnings)])
 
     def _labels(self, units: Units) -> dict[str, str]:

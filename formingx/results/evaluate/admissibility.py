@@ -11,11 +11,11 @@ import numpy as np
 from ...contact import resultants
 from ...findings import Finding, percent
 from ...forms.outline import Outline, edge_points
+from ...mesh.nodes import without_round_off
 from ...ranks import gathered
 from ...scene.tool_width import CUT
 from ...solve.state import State
 from ...values.tolerances import DIFFERENCE_STEP, FAR, LARGE_ERROR, NEGLIGIBLE, WARNED_ERROR
-from ..numbers import without_round_off
 
 
 @dataclass(frozen=True)

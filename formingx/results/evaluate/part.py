@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import InputError, as_list, check_name, finite, positive
+from ...mesh.nodes import without_round_off
 from ...scene.symmetry import NO_PLANES, MirrorPlanes
 from ...units import NONE, Units
-from ..numbers import PartNumbers, without_round_off
+from ..numbers import PartNumbers
 from .profile import refined
 from .wall import Wall
 

@@ -19,8 +19,8 @@ class Peeling(NamedTuple):
 
     Attributes:
         tool: name of the `Contact` with the tool, or of its boundary if it has no name.
-        ratio: sum of the tangential contact forces of all points over the sum of their normal forces, the largest of
-            all states.
+        ratio: sum of the magnitudes of the tangential contact forces of all points over the sum of their normal
+            forces, the largest ratio of the examined states.
     """
 
     tool: str
@@ -55,9 +55,10 @@ def findings(item: Peeling | None) -> list[Finding]:
     if item is None or item.ratio < LARGEST_FRICTION:
         return []
     return [Finding("warning", item.tool, f"the sheet is peeled off {item.tool!r}, to which it sticks: the tangential"
-                    f" contact forces come to {item.ratio:.2g} times the normal ones, on real tools to 0.05 to 1 times."
-                    f" Each point that separates moves suddenly; with friction, such as friction=1, the points slide"
-                    f" before they separate", "friction=1 in place of 'stick'")]
+                    f" contact forces are {item.ratio:.2g} times the normal ones; the friction of real tools is 0.05 to"
+                    f" 1 times the normal force. Each point that separates moves suddenly; with a coefficient of"
+                    f" friction, such as friction=1, the points slide before they separate",
+                    "friction=1 in place of 'stick'")]
 
 
 @register("failure")

@@ -117,19 +117,20 @@ class Profile:
         reach = min(s[-1], 2 * float(self.original_thickness.max()))
         return np.clip(1 - np.array([s, s[-1] - s]) / reach, 0.0, 1.0)
 
-    def through_wall(self, fractions: np.ndarray) -> np.ndarray:
+    def through_wall(self, fractions: np.ndarray | None = None) -> np.ndarray:
         """Return deformed positions between the faces, for drawing, shape (m, n, 2), length.
 
         They lie on straight lines from bottom to top points. Near the two ends of the section they are displaced normal
         to these lines, as much as the end bulges.
 
         Args:
-            fractions: position between bottom (0) and top (1), shape (m,).
+            fractions: position between bottom (0) and top (1), shape (m,); None: 17 positions at equal distances.
 
         Raises:
             InputError: a fraction that is not a finite number.
         """
-        fractions = finite_array("through_wall: fractions", fractions).ravel()
+        fractions = np.linspace(0, 1, _EDGE_POINTS) if fractions is None else finite_array(
+            "through_wall: fractions", fractions).ravel()
         s = fractions[:, None, None]
         straight = (1 - s) * self.bottom + s * self.top
         found = straight.copy()

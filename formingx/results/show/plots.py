@@ -90,7 +90,7 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
     """
     import numpy as np
     from matplotlib.collections import PolyCollection
-    rows = profile.through_wall(np.linspace(0, 1, 17)) * scale
+    rows = profile.through_wall() * scale
     strips = np.concatenate([rows[:, :-1], rows[::-1, 1:]]).swapaxes(0, 1)
     faces = (colours[1:] + colours[:-1]) / 2
     axes.fill(*(profile.outline * scale).T, color=faces[-1], zorder=1.9)       # of an end that rolls over the face

@@ -110,7 +110,7 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
         shades = shading(values)
         plotter.add_mesh(swept(line, values), **shades, specular=0.25, split_sharp_edges=True)
         for s in (stations[0], stations[-1]):          # the cut faces
-            rows = [np.column_stack(place(row, s)) for row in profile.through_wall(np.linspace(0, 1, 17))]
+            rows = [np.column_stack(place(row, s)) for row in profile.through_wall()]
             section = pyvista.StructuredGrid(*(np.stack([row[:, k] for row in rows], 1)[..., None] for k in range(3)))
             section["ratio"] = np.tile(ratio, len(rows))
             plotter.add_mesh(section, scalars="ratio", cmap=shades["cmap"], clim=shades["clim"], lighting=False,
