@@ -61,3 +61,12 @@ def test_status_names_the_target_of_a_stage_with_a_speed(tmp_path, capsys):
     assert main(["status", str(tmp_path / "run")]) == 0
     said = capsys.readouterr().out
     assert "stage 'air': air pressure 0.01 of 0.01" in said and "the target is met" in said
+
+
+def test_status_knows_that_a_target_without_a_column_is_met(tmp_path, capsys):
+    """A displacement is no column of the path."""
+    until = fx.displacement(0.3, at=(1.0, 0.0), component="z")
+    sheet = fx.Scene(mesh=fx.mesh.disc(radius=2.0, thickness=0.1, elements=(6, 1)), materials=fx.NeoHookean(c10=1.0),
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
+    fx.trace(sheet, until=until, checkpoint=tmp_path / "run", progress=False)
+    assert main(["status", str(tmp_path / "run")]) == 0 and "the target is met" in capsys.readouterr().out

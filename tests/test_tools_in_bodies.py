@@ -84,3 +84,11 @@ def test_a_sharp_open_tool_between_two_points_is_refused(points):
 def test_a_sharp_tool_above_a_node_makes_contact():
     path = fx.trace(ridge(12, 20.0), until=fx.travel(2.0), progress=False)
     assert path["tool_force"][-1] > 0
+
+
+def test_a_plane_on_the_wrong_side_is_no_question_of_units():
+    """A plane has no size; in a drawing it is a line of length 1, far shorter than the sheet."""
+    with pytest.raises(fx.InputError, match=r"starts inside the tool.*use tool.reversed\(\)$"):
+        fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(8, 1)), materials=fx.NeoHookean(c10=0.4),
+                 supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                 contacts=[fx.Contact("bottom", tools.plane(-5.0).mirrored())])
