@@ -200,7 +200,7 @@ function charts(data) {
     const figure = document.createElement("figure"), caption = document.createElement("figcaption"),
       plot = document.createElement("div");
     caption.textContent = chart.title; figure.append(caption, plot); element("charts").append(figure);
-    const axis = (title, zero) => ({title: {text: title, standoff: 8}, ...plain, ...(zero ? {rangemode: "tozero"} : {})});
+    const axis = (title, zero) => ({title: {text: title, standoff: 8}, automargin: true, ...plain, ...(zero ? {rangemode: "tozero"} : {})});
     Plotly.newPlot(plot, chart.traces, {font, height: 330, margin: {l: 60, r: 10, t: 28, b: 45}, plot_bgcolor: "white",
       xaxis: axis(chart.x, chart.zero === "x"), yaxis: axis(chart.y, chart.zero === "y"),
       showlegend: chart.traces.length > 1, legend: {orientation: "h", y: -0.3}}, config);
