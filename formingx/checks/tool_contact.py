@@ -6,10 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
-from ..contact import resultants
 from ..contact.tooling import Tooling
 from ..findings import Finding, register
+from ..ranks import combined
 from ..values.tolerances import ROUND_OFF
 from .mould_side import moulds
 
@@ -58,10 +59,10 @@ def untouched(path: Any) -> Iterator[Finding]:
 
 
 def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
-    """Return states in which the contact of a tool with the body is to be examined.
+    """Return the states in which the contact of a tool with the body is to be examined, the most promising first.
 
-    It is the last state with a force on the tool. If no state has a force, all states in which any tool touches the
-    body are returned, because the side walls of a mould bear no force along Z.
+    States with a force on the tool come first, the last one of them at the front. States in which any tool touches the
+    body follow, because the side walls of a mould bear no force along Z.
 
     Args:
         path: the `Path` of the run.
@@ -71,13 +72,18 @@ def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
     column = Tooling.of_problem(path.problem).force_columns.get(name, "")
     forced = [state for state in states if state.measures.get(column)]
     touching = [state for state in states if state.measures.get("contact_length", state.measures.get("contact_area"))]
-    return forced[-1:] or touching
+    return [*forced[::-1], *touching[::-1]]
 
 
 def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
-    """Return True if a contact point of one of the given `FaceContact` objects touches its tool in a state."""
+    """Return True if the force between a tool and the given `FaceContact` objects exceeds round-off; collective."""
+    def force(contact: Any) -> float:
+        """Return the sum of the magnitudes of the normal forces at the contact points."""
+        normal = contact.tractions(state.x, state.control).normal
+        return float(combined(problem.comm, float(contact.rule.area @ np.abs(normal)), MPI.SUM))
+
     with problem.state_context(state):
-        return any(resultants.length(contact, state.x, state.control) > 0 for contact in contacts
+        return any(force(contact) > ROUND_OFF * contact.force_scale for contact in contacts
                    if contact in problem.active_contacts)
 
 

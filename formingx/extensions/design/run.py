@@ -56,8 +56,10 @@ class Effects:
     def __str__(self) -> str:
         rows = np.unique(np.linspace(0, len(self.value) - 1, min(len(self.value), 12)).round().astype(int))
         lines = ["".join([f"{'at':>10}{self.measure[:10]:>12}", *(f"{name[:11]:>12}" for name in self.names)])]
+        largest = np.abs(self.jacobian).max(axis=0)         # with contact, 1e-6 of it is round-off
+        digits = [5 - int(np.floor(np.log10(size))) if 0 < size < np.inf else 0 for size in largest]
         lines += ["".join([f"{self.coordinates[k]:10.4g}{self.value[k]:12.5g}",
-                           *(f"{d:12.4g}" for d in self.jacobian[k])])
+                           *(f"{round(float(d), n):12.4g}" for d, n in zip(self.jacobian[k], digits, strict=True))])
                   for k in rows]
         return "\n".join(lines)
 
