@@ -196,7 +196,7 @@ class Clock:
         self.calls = {}                                     # seconds of each call, by (part, name)
 
     def _switch(self):
-        now = time.process_time()
+        now = time.thread_time()                            # process_time takes the kernel several microseconds
         if self._on:
             self.seconds[self._on[-1]] += now - self._last
         self._last = now

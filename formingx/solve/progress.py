@@ -204,7 +204,7 @@ class Progress:
         shown: True for a bar and for log lines of the level WARNING; False for no bar and lines of the level INFO.
 
     Attributes:
-        silence: processor time between two log lines, s.
+        silence: processor time of this thread between two log lines, s.
     """
 
     silence = 30.0
@@ -219,7 +219,7 @@ class Progress:
                              bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")
         self._gained, self._states, self._length = 0.0, 0, 0.0
         self._limits: Counter[str] = Counter()
-        self._began = self._said = time.process_time()
+        self._began = self._said = time.thread_time()
         self._gained_then = 0.0
 
     def show(self, gained: float, states: int, length: float) -> None:
@@ -257,7 +257,7 @@ class Progress:
 
     def _log_progress(self) -> None:
         """Log a line on the progress if the run took `silence` seconds of processor time since the last line."""
-        now = time.process_time()
+        now = time.thread_time()                            # the time of all threads takes the kernel up to 1 ms
         if not self._here or now - self._said < self.silence:
             return
         spent, won = now - self._said, self._gained - self._gained_then
