@@ -458,3 +458,14 @@ def test_expected_stretch_in_a_conical_mould():
                      contacts=[fx.Contact("top", fx.tools.cup(radius=10.0, depth=5.0, mouth=0.5, draft=45.0), "none")])
     (_, stretch), = expected_stretches(Body(scene, [], [], fx.Units()))
     assert stretch == pytest.approx(np.sqrt((5**2 + (5 + 10) * np.hypot(5, 5)) / 10**2), rel=1e-6)
+
+
+def test_a_symmetry_of_a_curved_edge_is_warned_of():
+    """An edge normal to the axis of symmetry is a mirror plane, one along it a roller; a curved edge is neither."""
+    mesh = fx.mesh.sphere(inner_radius=10.0, thickness=1.0, elements=(10, 1))
+    for edge, warned in (("inner", True), ("equator", False)):
+        scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("outer")],
+                         supports=[fx.Symmetry("axis"), fx.Symmetry(edge, "z")])
+        text = "'inner' is curved or inclined, and lies in no plane of symmetry: along it z goes from 0 to "
+        assert (text in str(fx.check(scene))) == warned
+        assert scene.symmetry_factor == (1 if warned else 2)

@@ -6,8 +6,9 @@ import numpy as np
 from mpi4py import MPI
 
 from ..findings import Finding, percent, register
+from ..mesh.nodes import SAME_PLACE
 from ..physics.models import DisplacementPenalty
-from ..physics.supports import PrescribedDisplacement, Symmetry
+from ..physics.supports import NAMES, PrescribedDisplacement, Symmetry
 from ..scene.scene import Scene
 from ..scene.target_checks import unreachable
 from ..tools.shapes import Arc
@@ -38,6 +39,21 @@ def _edges(body: Body) -> Iterator[Finding]:
         for name in sorted({*body.scene.mesh.boundaries} - {"bottom", "top"} - supported):
             yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: a symmetry cut"
                           f" (part='quarter') needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
+
+
+@register("scene")
+def _symmetry(body: Body) -> Iterator[Finding]:
+    """Report symmetries of boundaries that are curved or inclined: they lie in no plane of symmetry."""
+    near = SAME_PLACE * float(max(body.scene.extent))
+    for support in body.scene.supports:
+        if isinstance(support, Symmetry) and body.scene.model.solid and not support.guide:
+            nodes = body.scene.mesh.nodes_of(support.on)
+            low, high = nodes[:, support.component].min(), nodes[:, support.component].max()
+            if (np.ptp(nodes, axis=0) > near).all():
+                axis = NAMES[support.component]
+                yield Finding("warning", repr(support), f"{support.on!r} is curved or inclined, and lies in no plane of"
+                              f" symmetry: along it {axis} goes from {body.format(low, 'travel')} to"
+                              f" {body.format(high, 'travel')}. Is another boundary meant, or Clamped?")
 
 
 @register("scene")
