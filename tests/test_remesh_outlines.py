@@ -43,8 +43,10 @@ def test_long_elements_of_a_thin_curved_strip_cross():
 
 def test_an_outline_that_crosses_itself_ends_the_run_with_a_reason(monkeypatch):
     monkeypatch.setattr(outline_mesh, "crossing_point", lambda points, edges: points[0])
-    with pytest.raises(fx.ConvergenceError, match=r"outline of the body crosses itself .*Remesh\(corner=") as error:
+    said = r"^travel = 1.0799 was not reached: remesh: .* outline of the body crosses itself .*Remesh\(corner="
+    with pytest.raises(fx.ConvergenceError, match=said) as error:
         pressed(size=0.15)
+    assert str(error.value).endswith("it is kept in the error's `path`.")
     assert error.value.path["travel"][-1] > 0.1
 
 

@@ -47,7 +47,7 @@ def _symmetry(body: Body) -> Iterator[Finding]:
     near = SAME_PLACE * float(max(body.scene.extent))
     for support in body.scene.supports:
         if isinstance(support, Symmetry) and body.scene.model.solid and not support.guide:
-            nodes = body.scene.mesh.nodes_of(support.on)
+            nodes = body.scene.mesh.nodes_of(str(support.on))
             low, high = nodes[:, support.component].min(), nodes[:, support.component].max()
             if (np.ptp(nodes, axis=0) > near).all():
                 axis = NAMES[support.component]

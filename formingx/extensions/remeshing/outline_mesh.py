@@ -11,6 +11,7 @@ from ...mesh import with_gmsh
 from ...mesh.check import crossing_point
 from ...mesh.grid import Grid, to_mesh
 from ...mesh.mesh import Mesh
+from ...mesh.nodes import without_round_off
 
 _SIZE_GROWTH = 0.3
 """Growth of the element size per distance from a corner."""
@@ -55,8 +56,9 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
     n = len(ring)
     following = np.column_stack([np.arange(n), np.roll(np.arange(n), -1)])
     if (place := crossing_point(ring, following)) is not None:          # gmsh might not end
+        r, z = without_round_off(place, ring)
         raise InputError(f"remesh: the outline of the body crosses itself with elements of this size near (r, z) ="
-                         f" ({place[0]:.5g}, {place[1]:.5g}): take a smaller Remesh(corner=) or Remesh(size=)")
+                         f" ({r:.5g}, {z:.5g}): take a smaller Remesh(corner=) or Remesh(size=)")
     try:
         with with_gmsh.model("body") as gmsh:
             geo = gmsh.model.geo

@@ -178,7 +178,7 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
             except ConvergenceError as error:                # a mesh may succeed at the next state
                 crushed = _volume_ratios(record, record.last)[0] < _MIN_VOLUME_MARGIN * remesh.volume_ratio[0]
                 if crushed or len(failed) == _MAX_FAILURES or any(record.last is state for state in failed):
-                    raise
+                    raise _not_reached(record, error) from None
                 failed.append(record.last)
                 log.info("the old mesh is kept for a state: %s", error)
         record.ended = ""
@@ -194,6 +194,14 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
         if not poor:
             return
     record.ended = ""
+
+
+def _not_reached(record: Record, error: ConvergenceError) -> ConvergenceError:
+    """Return the error of a run that ends before its target since no new mesh has an equilibrium, for that reason."""
+    name, value = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)["until"]
+    stage = f"Stage {record.stage!r}: " * bool(record.stage)
+    return ConvergenceError(f"{stage}{Target(name, value, None)} was not reached: {error}. The last good state is"
+                            f" {record.describe(record.last)}; it is kept in the error's `path`.")
 
 
 def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
