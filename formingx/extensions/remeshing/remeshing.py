@@ -32,7 +32,7 @@ from ...solve.state import State
 from ...solve.stepping import StepControl
 from .contact_transfer import ContactState, transfer_contact
 from .earlier_meshes import scene_on_new_mesh
-from .outline_mesh import enclosed_volume, mesh_of_outline
+from .outline_mesh import enclosed_volume, mesh_of_outline, refined_points, without_pockets
 from .state_transfer import StateTransfer
 
 log = logging.getLogger("formingx")
@@ -333,8 +333,8 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
     sizes = share * remesh.size, share * (remesh.corner or remesh.size / 3)
     volume = enclosed_volume(edges[order], scene.kinematics.axisymmetric)
     on_tools = np.concatenate([edges[:0, 0], *(points for _, points in touched)])
-    edges = _without_pockets(edges[order], on_tools, _POCKET_DEPTH * sizes[1])
-    corners = _refined_points(edges, names, touched)
+    edges = without_pockets(edges[order], on_tools, _POCKET_DEPTH * sizes[1])
+    corners = refined_points(edges, names, touched)
     layer, = scene.mesh.layers
     mesh = mesh_of_outline(edges, names, corners, *sizes, layer, scene.kinematics.axisymmetric, scene.mesh.comm, volume,
                     lambda x, names: _moved_out_of_tools(x, names, contacts))
@@ -393,28 +393,6 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
     return record.last.x
 
 
-def _without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.ndarray:
-    """Return the edges of the outline, shape (m, 3, 2), with shallow pockets between body and tool closed.
-
-    Nodes between two contact nodes are moved onto the line of these two if all are within `depth` of it. A side that
-    rolls onto a plate may leave such a node in a crease.
-
-    Args:
-        edges: edges in order: first end, second end, midpoint, shape (m, 3, 2), length.
-        touched: positions of the contact nodes, shape (k, 2), length.
-        depth: largest depth of a pocket, length.
-    """
-    nodes, n = edges[:, [0, 2]].reshape(-1, 2).copy(), 2 * len(edges)
-    close = 1e-6 * np.ptp(nodes, axis=0).max()
-    on = np.flatnonzero(np.linalg.norm(nodes[:, None] - touched[None], axis=2).min(1, initial=np.inf) < close)
-    for a, b in zip(on, np.roll(on, -1)):
-        between, along = (a + np.arange(1, (b - a) % n)) % n, nodes[b] - nodes[a]
-        offsets, length = nodes[between] - nodes[a], np.linalg.norm(along)
-        if length > 0 and np.abs(offsets[:, 0] * along[1] - offsets[:, 1] * along[0]).max(initial=0.0) < depth * length:
-            nodes[between] = nodes[a] + np.linspace(0, 1, len(between) + 2)[1:-1, None] * along
-    return np.stack([nodes[::2], np.roll(nodes[::2], -1, axis=0), nodes[1::2]], axis=1)
-
-
 def _moved_out_of_tools(x: np.ndarray, names: frozenset[str],
                         contacts: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
     """Return new outline points moved out of the tools, to the penetration depth of the old contact points beside them.
@@ -431,28 +409,3 @@ def _moved_out_of_tools(x: np.ndarray, names: frozenset[str],
             near = contact.contact.tool.nearest(x - travel)
             x = x - before.outward_motion(x - travel, near.distance)[:, None] * near.normal
     return x
-
-
-def _refined_points(edges: np.ndarray, names: list[frozenset[str]],
-                    touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
-    """Return the points of the outline that get small elements, shape (k, 2), length.
-
-    These are the corners between two boundaries that have contacts, and the ends of contact areas.
-
-    Args:
-        edges: edges in order: first end, second end, midpoint, shape (m, 3, 2), length.
-        names: names of the boundaries of each edge.
-        touched: (boundary, positions of its nodes in contact, shape (n, 2), length) of each contact.
-    """
-    faces = {on for on, _ in touched}
-    found = []
-    pressed, close = np.zeros(len(edges), dtype=bool), 1e-6 * np.ptp(edges[:, 0], axis=0).max()
-    for on, points in touched:
-        if len(points):
-            distance = np.linalg.norm(edges[:, 2][:, None] - points[None], axis=2).min(1)
-            pressed |= np.array([on in boundaries for boundaries in names]) & (distance < close)
-    for k in range(len(edges)):
-        a, b = names[k - 1] & faces, names[k] & faces
-        if a and b and (a != b or pressed[k] != pressed[k - 1]):
-            found.append(edges[k, 0])
-    return np.array(found).reshape(-1, 2)
