@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..values.tolerances import CURVE_POINTS
 from .fillets import FilletInSheet, FlatsInSheet, fillets_in_sheet, flats_in_sheet
 from .mesh import Mesh, Preset
 from .sizes import GROWTH, ends_of_columns, length_along, moved_nodes, number_of_columns
@@ -87,8 +88,6 @@ _BESIDE_END = 3.0
 """Distance of the middle of a lip, a convex fillet, from a constrained end, over the thickness, below which the sheet
 is hardly stretched there and needs no more elements through it."""
 
-_SHEET_SAMPLES = 2000            # points of the sheet at which sizes are computed
-
 
 def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_through: bool = False) -> Mesh:
     """Return a mesh of the same body with short columns of elements at the fillets of its tools.
@@ -104,7 +103,7 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     preset, columns = mesh.preset, mesh.columns
     if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
         return mesh
-    coordinates = np.linspace(columns.ends[0], columns.ends[-1], _SHEET_SAMPLES)
+    coordinates = np.linspace(columns.ends[0], columns.ends[-1], CURVE_POINTS)
     rows = columns.place(coordinates)
     s = length_along(rows[[0, -1]].mean(0))
     faces = dict(zip(columns.faces, rows[[0, -1]]))
@@ -189,7 +188,7 @@ def is_thick_sheet(mesh: Mesh) -> bool:
     if mesh.preset is None or mesh.columns is None:
         return False
     ends = mesh.columns.ends
-    line = mesh.columns.place(np.linspace(ends[0], ends[-1], _SHEET_SAMPLES))[[0, -1]].mean(0)
+    line = mesh.columns.place(np.linspace(ends[0], ends[-1], CURVE_POINTS))[[0, -1]].mean(0)
     return _THICKEST < float(mesh.preset.thickness.sum()) / length_along(line)[-1] < _BLOCK
 
 

@@ -1,4 +1,4 @@
-"""Branch points: pairs of neighbouring states of a path between which another path branches off."""
+"""Branch points between neighbouring states of a path, and steps that end on another piece of the path."""
 
 from __future__ import annotations
 
@@ -7,7 +7,9 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from .arc_length import Curve
+from .equations import Equations
 from .linear import DirectSolver
+from .newton import Failure
 from .state import State
 
 log = logging.getLogger("formingx")
@@ -15,6 +17,59 @@ log = logging.getLogger("formingx")
 ANOTHER_PATH = ("between %s and %s another path branches off (a bifurcation, not a limit point), and a real body may"
                 " follow it: path.stability([0]) finds where, and its mode")
 """Format of a warning; its arguments are the descriptions of two neighbouring states."""
+
+
+class ReversedOrientation(Failure):
+    """Failure of a step between whose ends the orientation changes its sign; shorter steps show the reason."""
+
+
+class OrientationCheck:
+    """Check of one step that its end lies on the piece of path on which it began (Allgower and Georg 1990).
+
+    `State.orientation` is constant along a smooth path, through limit points, too. It differs at both ends of a step
+    over two limit points that are close together, which ends on a piece of path that comes back. A step half as long,
+    or shorter, does not pass them. If the orientation differs at the end of each shorter step as well, another path
+    branches off, and the first step is accepted.
+
+    Args:
+        problem: the equations.
+
+    Attributes:
+        max_halvings: number of halvings after which the first length of the step is restored.
+    """
+
+    max_halvings = 4
+
+    def __init__(self, problem: Equations):
+        self._problem, self._lengths = problem, list[float]()
+
+    @property
+    def halves(self) -> bool:
+        """True while shorter lengths of the step are tried, since the orientation was reversed at its first end."""
+        return 0 < len(self._lengths) <= self.max_halvings
+
+    def check(self, old: State, new: State) -> None:
+        """Raise `ReversedOrientation` if a step between two states should be repeated with another length.
+
+        Args:
+            old: state at the start of the step.
+            new: state at its end.
+        """
+        smooth = old.kind in ("step", "target") or old.kind == "start" and not self._problem.singular_unloaded
+        if smooth and old.orientation * new.orientation < 0 and len(self._lengths) <= self.max_halvings:
+            raise ReversedOrientation("a limit point or another path may lie within the step", [])
+
+    def next_length(self, length: float) -> float:
+        """Return the length of the next attempt of the step.
+
+        Args:
+            length: arc length of the rejected attempt, dimensionless.
+
+        Returns:
+            Half the length. After `max_halvings` halvings it is the length of the first attempt.
+        """
+        self._lengths.append(length)
+        return length / 2 if self.halves else self._lengths[0]
 
 
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
@@ -84,11 +139,12 @@ def _orientation_changes(curve: Curve, states: Sequence[State]) -> list[tuple[St
     """Return the pairs of neighbouring states with different `State.orientation`: a branch point lies between them.
 
     Left out are limit points, where the sign of the determinant is round-off, and pairs across a jump or the start of a
-    stage. The sign of the orientation is reversed where a run reverses its direction along the path.
+    stage. The sign of the orientation is reversed where a run reverses its direction along the path. For a problem with
+    history variables the list is empty.
     """
-    found = []
+    found: list[tuple[State, State]] = []
     last: State | None = None
-    for state in states:
+    for state in [] if curve.problem.has_history else states:
         if state.kind == "limit point":
             continue
         first = state.kind in ("start", "jump") or last is not None and last.setting != state.setting

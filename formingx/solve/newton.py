@@ -203,7 +203,7 @@ class BorderedNewton:
                  settings: Newton | None = None, drag: Drag | None = None):
         self.problem, self.tolerances, self._norm = problem, tolerances, norm
         self.settings, self._drag = settings or Newton(), drag
-        self.solver = DirectSolver(problem.matrix, problem.symmetric, determinant=not problem.has_history)
+        self.solver = DirectSolver(problem.matrix, problem.symmetric, determinant=not drag)
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0

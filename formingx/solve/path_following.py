@@ -19,7 +19,7 @@ from ..contact.step_limit import TrialStep
 from ..measures.targets import Amplitude, Target
 from . import predictor
 from .arc_length import Predictor
-from .branches import warn_of_branches
+from .branches import OrientationCheck, ReversedOrientation, warn_of_branches
 from .diagnose import diagnose, not_reached
 from .equations import Array, Attempt, Quantity
 from .jump_rules import JumpRules, at_limit_points, snaps
@@ -203,6 +203,7 @@ class Run:
         first state with history variables, nor near the control of an earlier snap-through without equilibrium.
         """
         first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
+        self._orientation = OrientationCheck(self.problem)
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
         if snaps(self.curve, old, self._jumps.rule, self._sense):
             return self._snap(old)
@@ -223,6 +224,10 @@ class Run:
                 if most < self.step.smallest:
                     self._give_up(f"the step became shorter than {self.step.smallest:g}: {cut}")
             except Failure as failure:
+                if isinstance(failure, ReversedOrientation) or self._orientation.halves:
+                    self.step.length = self._orientation.next_length(length)
+                    self._failed(failure.reason, self.step.length)
+                    continue
                 self.step.length, end = length, None
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
                 good, failed = self.step.failed(), failed + (not isinstance(failure, _PassedState))
@@ -278,6 +283,7 @@ class Run:
             raise Failure("the path turns back here", [])
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _PassedState("the iteration fell back to a part of the path that was passed already", [])
+        self._orientation.check(old, new)
         error, variables = self._error_in_time(new), self.problem.history_variables
         try:
             new = separate_points(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new

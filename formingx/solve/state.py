@@ -34,8 +34,9 @@ class State:
         stepping: {name: data} with which a run continues after this state: its step control, its counts and its target;
             empty for a state inside a step.
         time: process time.
-        orientation: sign of det(dF/dx) times the sign of the slope; 0 if it is not known. It is constant along a path,
-            also through limit points, and changes its sign where another path branches off.
+        orientation: sign of det(dF/dx) times the sign of the slope; 0 if it is not known. It is constant along a smooth
+            path, also through limit points, and changes its sign where another path branches off. At a kink of F it
+            belongs to the side of the next step, as the tangent does.
         inadmissible_reason: reason for which no body can have this state, as text; "" for an admissible state. A run
             continues past an inadmissible state only with `allow_inadmissible=True`.
 

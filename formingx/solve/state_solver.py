@@ -222,6 +222,7 @@ class StateSolver:
         self._x.array_w[:] = state.x
         limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
         at_hand, self._found = at_hand and not (limit and limit.predicts_events), None
+        count = self.newton.solver.count
         if at_hand and self.newton.update_one_sided(self._x, state.control) or self.newton.tangent(
                 self._x, state.control, one_sided=True):
             size = self._length_of(self.newton.b)
@@ -229,6 +230,8 @@ class StateSolver:
             sense = np.sign(state.slope if state.kind == "start" else        # round-off may turn a film's displacements
                             self._inner(direction, slope, state.direction, state.slope)) or 1.0
             state.direction, state.slope = sense * direction, sense * slope
+            if self.newton.solver.count > count and not self.fixed_control:
+                state.orientation = self.newton.solver.sign() * int(sense)
             self._one_sided_state = state, self.newton.solver.count
 
     def factorise_one_sided(self, state: State) -> bool:
@@ -381,7 +384,7 @@ class StateSolver:
         if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
                                               control - before.control) < 0:
             state.direction, state.slope = -state.direction, -state.slope
-        if not (self.fixed_control or self.problem.has_history):
+        if not self.fixed_control:
             state.orientation = self.newton.solver.sign() * int(np.sign(state.slope))
         return state
 
