@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 from .arc_length import Curve
-from .equations import Equations
 from .linear import DirectSolver
 from .newton import Failure
 from .state import State
@@ -27,26 +27,31 @@ class OrientationCheck:
     """Check of one step that its end lies on the piece of path on which it began (Allgower and Georg 1990).
 
     `State.orientation` is constant along a smooth path, through limit points, too. It differs at both ends of a step
-    over two limit points that are close together, which ends on a piece of path that comes back. A step half as long,
-    or shorter, does not pass them. If the orientation differs at the end of each shorter step as well, another path
-    branches off, and the first step is accepted.
+    over two limit points that are close together, which ends on a piece of path that comes back, and of a step over a
+    branch point. So a step with different orientations is halved. If the shorter step ends on the cubic through both
+    ends of the longer one with their tangents, the path is smooth between them: another path branches off, and the
+    longer step is accepted.
 
     Args:
-        problem: the equations.
+        curve: solver of the path.
+        shortest: arc length below which no shorter step is tried.
 
     Attributes:
-        max_halvings: number of halvings after which the first length of the step is restored.
+        max_distance: distance of a state from the cubic, over the distance of its ends, up to which the path is smooth.
+            On smooth paths it was at most 0.009, with contact mostly 0.025, beside two limit points 0.041.
     """
 
-    max_halvings = 4
+    max_distance = 0.03
 
-    def __init__(self, problem: Equations):
-        self._problem, self._lengths = problem, list[float]()
+    def __init__(self, curve: Curve, shortest: float):
+        self._curve, self._shortest, self._accepts = curve, shortest, False
+        self._lengths: list[float] = []
+        self._end: State | None = None                      # end of the last attempt with another orientation
 
     @property
     def halves(self) -> bool:
-        """True while shorter lengths of the step are tried, since the orientation was reversed at its first end."""
-        return 0 < len(self._lengths) <= self.max_halvings
+        """True while shorter lengths of the step are tried, since the orientation differed at its first end."""
+        return bool(self._lengths) and not self._accepts
 
     def check(self, old: State, new: State) -> None:
         """Raise `ReversedOrientation` if a step between two states should be repeated with another length.
@@ -55,8 +60,12 @@ class OrientationCheck:
             old: state at the start of the step.
             new: state at its end.
         """
-        smooth = old.kind in ("step", "target") or old.kind == "start" and not self._problem.singular_unloaded
-        if smooth and old.orientation * new.orientation < 0 and len(self._lengths) <= self.max_halvings:
+        smooth = old.kind in ("step", "target") or old.kind == "start" and not self._curve.problem.singular_unloaded
+        if self._accepts or not smooth or not self._lengths and self._curve.distance(old, new) < 2 * self._shortest:
+            return
+        self._accepts = self._end is not None and self._distance(old, new, self._end) < self.max_distance
+        if self._accepts or old.orientation * new.orientation < 0:
+            self._end = new
             raise ReversedOrientation("a limit point or another path may lie within the step", [])
 
     def next_length(self, length: float) -> float:
@@ -66,10 +75,21 @@ class OrientationCheck:
             length: arc length of the rejected attempt, dimensionless.
 
         Returns:
-            Half the length. After `max_halvings` halvings it is the length of the first attempt.
+            Half the length, or the length of the first attempt if it is to be accepted.
         """
         self._lengths.append(length)
-        return length / 2 if self.halves else self._lengths[0]
+        self._accepts |= length < 2 * self._shortest
+        return self._lengths[0] if self._accepts else length / 2
+
+    def _distance(self, old: State, new: State, end: State) -> float:
+        """Return the distance of a state from the cubic between the states `old` and `end`, over their distance."""
+        low, high, position = 0.0, 1.0, self._curve.progress(old, new)
+        for _ in range(40):                                 # bisection: the cubic in the plane of the step to `new`
+            middle = (low + high) / 2
+            x, control = self._curve.interpolate(old, end, middle)
+            point = replace(new, x=x, control=control)
+            low, high = (middle, high) if self._curve.progress(old, point) < position else (low, middle)
+        return self._curve.distance(new, point) / self._curve.distance(old, end)
 
 
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:

@@ -203,8 +203,8 @@ class Run:
         first state with history variables, nor near the control of an earlier snap-through without equilibrium.
         """
         first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
-        self._orientation = OrientationCheck(self.problem)
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
+        self._orientation = OrientationCheck(self.curve, self.settings.snap_through.lengths[0])
         if snaps(self.curve, old, self._jumps.rule, self._sense):
             return self._snap(old)
         events: Any = limit and limit.predict(self.curve, old)                         # type: ignore[arg-type]
