@@ -469,3 +469,16 @@ def test_a_symmetry_of_a_curved_edge_is_warned_of():
         text = "'inner' is curved or inclined, and lies in no plane of symmetry: along it z goes from 0 to "
         assert (text in str(fx.check(scene))) == warned
         assert scene.symmetry_factor == (1 if warned else 2)
+
+
+@pytest.mark.parametrize(("support", "friction", "shift", "lip", "warned"), [
+    (fx.SimplySupported, "stick", 0.0, 0.0, True), (fx.SimplySupported, 0.3, 0.0, 0.0, True),
+    (fx.SimplySupported, "stick", 1e-6, 0.0, False), (fx.SimplySupported, "stick", 0.0, 0.05, False),
+    (fx.SimplySupported, "none", 0.0, 0.0, False), (fx.Clamped, "stick", 0.0, 0.0, False)])
+def test_a_hinged_edge_at_a_sharp_edge_is_warned_of(support, friction, shift, lip, warned):
+    """The wall of demos/gradients.py jumped by 0.4 % with the direction of a contact that was round-off."""
+    mould = fx.tools.cup(radius=1.0, depth=0.7, mouth=(1 + shift) * 0.03, draft=10.0, fillet=0.2, lip=lip)
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.03, elements=(30, 1)), loads=[fx.Pressure("bottom")],
+                     materials=fx.NeoHookean(c10=0.5), supports=[fx.Symmetry("axis"), support("rim")],
+                     contacts=[fx.Contact("top", mould, friction)])
+    assert ("round-off decides whether both stick together" in str(fx.check(scene))) == warned

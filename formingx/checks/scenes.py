@@ -8,11 +8,11 @@ from mpi4py import MPI
 from ..findings import Finding, percent, register
 from ..mesh.nodes import SAME_PLACE
 from ..physics.models import DisplacementPenalty
-from ..physics.supports import NAMES, PrescribedDisplacement, Symmetry
+from ..physics.supports import NAMES, PrescribedDisplacement, SimplySupported, Symmetry
 from ..scene.scene import Scene
 from ..scene.target_checks import unreachable
 from ..tools.shapes import Arc
-from ..values.tolerances import MEASURED_ACCURACY
+from ..values.tolerances import MEASURED_ACCURACY, ROUND_OFF
 from .sizes import Body
 
 _ASPECT_RATIO = 110.0       # longest edge over height; discs with 100 give correct results in benchmarks/extremes.py
@@ -54,6 +54,28 @@ def _symmetry(body: Body) -> Iterator[Finding]:
                 yield Finding("warning", repr(support), f"{support.on!r} is curved or inclined, and lies in no plane of"
                               f" symmetry: along it {axis} goes from {body.format(low, 'travel')} to"
                               f" {body.format(high, 'travel')}. Is another boundary meant, or Clamped?")
+
+
+@register("scene")
+def _hinged_edges(body: Body) -> Iterator[Finding]:
+    """Report sharp edges of tools with friction at the edge of a hinged face.
+
+    The face rotates, so its edge leaves the tool, unless it sticks. The direction of the contact is round-off there.
+    """
+    hinged = [body.scene.mesh.nodes_of(support.on) for support in body.scene.supports
+              if isinstance(support, SimplySupported)]
+    for contact in body.scene.contacts if hinged else ():
+        if contact.tool.components == 3 or contact.symmetric:
+            continue
+        nodes, pieces = np.concatenate(hinged), contact.tool.pieces
+        for a, b in zip(pieces, pieces[1:]):
+            corner = a.ends[1]
+            turns = abs(np.sin(b.angles[0] - a.angles[1])) > ROUND_OFF
+            if turns and (np.linalg.norm(nodes - corner, axis=1) < ROUND_OFF * body.length).any():
+                yield Finding("warning", repr(contact), f"its sharp edge at (R, Z) = ({corner[0]:.4g}, {corner[1]:.4g})"
+                              f" touches the edge of a hinged face: round-off decides whether both stick together,"
+                              f" which changed walls by 0.4 %. Give the tool a lip, move it by a millionth of the"
+                              f" thickness, or use Clamped")
 
 
 @register("scene")
