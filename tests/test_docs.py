@@ -81,6 +81,7 @@ def test_printed_output_is_compared_to_the_shown_digits(shown, printed, same):
         assert_shows(shown, printed)
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
 @pytest.mark.parametrize("file", NOTEBOOKS, ids=lambda p: p.stem)
 def test_notebook(file, tmp_path):
