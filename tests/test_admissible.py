@@ -151,6 +151,7 @@ else:
 """
 
 
+@pytest.mark.thorough
 def test_ranks_agree():
     serial = run_json(RANKS, 1)
     assert serial[0] == "in-plane determinant" and serial[1] == pytest.approx(-0.2) and serial[2][0] == pytest.approx(1)

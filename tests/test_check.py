@@ -382,6 +382,7 @@ def test_free_inflation():
     assert first_peak(FreeInflation([(fx.Gent(mu=1.0, Jm=3.0), 0.1)], 2.0).tube) is None
 
 
+@pytest.mark.thorough
 def test_every_demo_is_sound():
     """And the pot of the README; of those that run a scene before they have computed anything."""
     without = {"chilling", "cold_plug", "fit_treloar", "heated_disc", "heating", "measured_biaxial", "plates",
@@ -444,6 +445,7 @@ for parallel.WITHOUT_GAIN in (100, 1_150_000):
 """
 
 
+@pytest.mark.thorough
 def test_ranks_that_save_no_time_are_noted():
     """On two ranks, below the size from which they pay."""
     lines = run_script(FEW, ranks=2).splitlines()

@@ -217,6 +217,7 @@ def test_names_of_columns_are_read_back(tmp_path, name):
     assert csv_files.read(tmp_path / "run.csv").columns[name].tolist() == [1.5, 2.5]
 
 
+@pytest.mark.thorough
 def test_on_two_ranks(tmp_path):
     """Report and file are the same on one and on two ranks."""
     write(tmp_path / "theirs.csv", "pressure,pole_height", [[0.0, 0.3, 0.45, 0.49], [0.0, 0.5, 0.9, 1.3]])

@@ -187,6 +187,7 @@ print(path.problem.limit.predicts_events, path.profile().thickness[0])
 """
 
 
+@pytest.mark.thorough
 def test_events_at_points_between_nodes_on_two_ranks():
     """Points whose nodes are on another rank: all ranks evaluate the contact law together, also where none sticks."""
     (active, one), = (printed.split() for printed in printed_by(ON_RANKS))

@@ -122,6 +122,7 @@ push(*sys.argv[1:])
 """
 
 
+@pytest.mark.thorough
 def test_ranks_agree_and_continue_runs_of_other_ranks(tmp_path):
     """A facet's points are on one rank, its nodes may be on another."""
     one, two, three, end = (tmp_path / name for name in ("one", "two", "three", "end"))

@@ -171,6 +171,7 @@ if scene.mesh.comm.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_two_ranks_agree_with_one():
     one, two = (run_json(RANKS, ranks) for ranks in (1, 2))
     assert two == pytest.approx(one, rel=1e-9)

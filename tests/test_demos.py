@@ -15,6 +15,8 @@ from conftest import ROOT, drawn, run
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import all_demos  # noqa: E402
 
+pytestmark = pytest.mark.thorough
+
 STORED = json.loads((ROOT / "benchmarks" / "all_demos.json").read_text())["full"]
 """{demo: numbers of its summary}: keys that other programs and people read, so none may be renamed."""
 OPTIONAL = {"coarse", "stack"}

@@ -4,6 +4,8 @@ import pytest
 from conftest import drawn
 from test_demos import summary
 
+pytestmark = pytest.mark.thorough
+
 
 def test_gradients_quick(tmp_path):
     found = summary("gradients", tmp_path, "--quick")

@@ -201,6 +201,7 @@ except fx.ConvergenceError as error:
 """
 
 
+@pytest.mark.thorough
 def test_ranks_give_the_same_diagnosis():
     one, two = run_json(SCRIPT, 1), run_json(SCRIPT, 2)
     assert two == pytest.approx(one, rel=1e-4)

@@ -147,6 +147,7 @@ except OSError as error:
 """
 
 
+@pytest.mark.thorough
 def test_on_two_ranks(inflated, tmp_path):
     assert run_script(VTK, tmp_path / "two.pvd", ranks=2).count("True") == 2
     inflated.to_vtk(tmp_path / "one.pvd", "all")

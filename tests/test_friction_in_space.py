@@ -183,6 +183,7 @@ def test_work_of_the_plug_is_strain_energy_and_friction(rough_ball):
     assert work == pytest.approx(energy[-1] + lost, rel=0.01)
 
 
+@pytest.mark.thorough
 @pytest.mark.slow
 def test_two_ranks_slide_alike():
     script = """

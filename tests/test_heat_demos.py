@@ -5,6 +5,8 @@ import json
 import pytest
 from conftest import drawn, run
 
+pytestmark = pytest.mark.thorough
+
 TIMES = {"heating": {"convection": (5, 10, 20, 40, 80, 160), "two_sides": (5, 10, 20, 40, 80, 160),
                      "radiation_400_400": (10, 20, 40, 60, 80, 100), "radiation_450_350": (10, 20, 40, 60, 80, 100),
                      "absorbed": (10, 20, 40, 60, 80, 100)},

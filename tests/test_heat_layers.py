@@ -121,6 +121,7 @@ if mesh.comm.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_ranks_agree():
     one, three = (run_json("import sys; sys.path.insert(0, 'tests')" + RANKS, ranks) for ranks in (1, 3))
     assert three == pytest.approx(one, rel=1e-7)

@@ -183,6 +183,7 @@ if path.problem.comm.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_ranks_agree():
     serial, other = (run_json(SCRIPT, ranks) for ranks in (1, 3))
     assert other == pytest.approx(serial, rel=1e-8)

@@ -242,6 +242,7 @@ if path.problem.comm.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_ranks_agree():
     serial, *others = [run_json(SCRIPT, ranks) for ranks in (1, 2, 3)]
     for other in others:

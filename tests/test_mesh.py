@@ -196,6 +196,7 @@ def test_parts_of_a_boundary():
                                                                                      (0, 2))], rel=1e-10)
 
 
+@pytest.mark.thorough
 def test_parts_on_two_ranks():
     script = ("import formingx as fx; m = fx.mesh.disc(radius=2.0, thickness=0.1, elements=(20, 1),"
               " concentrate={0.5: 0.2}).with_part('plug', 'top', (0, 0.5)); n = [len(m.nodes_of(k)) for k in"

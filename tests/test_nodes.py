@@ -51,6 +51,7 @@ def test_file_and_back(tmp_path, numbering):
     assert pressures[1] == pytest.approx(pressures[0], rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_read_on_two_ranks(tmp_path):
     fx.mesh.write(treloar((10, 1)).mesh, tmp_path / "sheet.txt")
     script = f"""import formingx as fx

@@ -3,6 +3,8 @@
 import pytest
 from on_ranks import Ranks
 
+pytestmark = pytest.mark.thorough
+
 WHO = "from mpi4py import MPI; print(MPI.COMM_WORLD.rank, *__import__('sys').argv[1:])"
 STUCK = "from mpi4py import MPI; MPI.COMM_WORLD.rank or MPI.COMM_WORLD.Barrier()"
 

@@ -4,6 +4,8 @@ import pytest
 from conftest import drawn
 from test_demos import summary
 
+pytestmark = pytest.mark.thorough
+
 
 def check(found, exact, quadrature):
     """Deviations of all problems; exact: allowed for displacements, quadrature: for projected stresses."""

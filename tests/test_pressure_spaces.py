@@ -145,6 +145,7 @@ if path.problem.comm.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_ranks_agree_with_two_layers():
     serial, *others = [run_json(SCRIPT, ranks) for ranks in (1, 2, 3)]
     for other in others:

@@ -65,6 +65,7 @@ def test_a_run_continues_from_any_state_to_the_same_path(name, whole):
             assert (again.counts.steps, again.counts.iterations) == (path.counts.steps, path.counts.iterations)
 
 
+@pytest.mark.thorough
 @pytest.mark.quick
 @pytest.mark.parametrize("name, ranks", [("hinged", (1, 2)), ("hinged", (2, 1)), ("stick", (1, 2)), ("stick", (2, 1)),
                                          ("membrane", (1, 2))])
@@ -365,6 +366,7 @@ except OSError as error:
 """
 
 
+@pytest.mark.thorough
 def test_errors_come_on_all_ranks():
     assert run_script(UNWRITABLE, ranks=2).count("cannot be begun") == 2
 

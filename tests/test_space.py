@@ -219,6 +219,7 @@ def test_trim_and_printed_squares_are_exact():
             wall.printed(size)
 
 
+@pytest.mark.thorough
 def test_ranks():
     script = """
 import json, sys

@@ -276,6 +276,7 @@ if MPI.COMM_WORLD.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_ranks():
     one, two = run_json(RANKS, 1), run_json(RANKS, 2)
     assert np.array(one)[:, :2] == pytest.approx(np.array(two)[:, :2], rel=1e-8) and len(one) == 1

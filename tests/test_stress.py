@@ -232,6 +232,7 @@ if path.problem.comm.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_ranks_agree():
     serial, *others = [run_json(RANKS, ranks) for ranks in (1, 2, 3)]
     for other in others:

@@ -7,6 +7,8 @@ import pytest
 from conftest import drawn, run
 from test_demos import summary
 
+pytestmark = pytest.mark.thorough
+
 
 @pytest.mark.parametrize("demo", ["thick_cylinder", "thick_plate", "material_constants", "two_layer"])
 def test_help_names_every_option(demo):

@@ -337,6 +337,7 @@ if problem.comm.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_saved_history_variables_do_not_depend_on_ranks():
     for (one, energy, sums), (two, energy_two, sums_two) in zip(run_json(MEMORY, 1), run_json(MEMORY, 2)):
         assert one["cells"] == two["cells"] and energy == pytest.approx(energy_two, rel=1e-12)

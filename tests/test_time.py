@@ -90,6 +90,7 @@ if path.problem.comm.rank == 0:
 """
 
 
+@pytest.mark.thorough
 def test_ranks_agree():
     one, two = (run_json(RANKS, ranks) for ranks in (1, 2))
     assert two == pytest.approx(one, rel=1e-8, abs=1e-12)
