@@ -82,11 +82,38 @@ def register(moment: Moment) -> Callable[[_Check], _Check]:
 def findings_at(moment: Moment, subject: Any) -> list[Finding]:
     """Call all checks that are registered for a moment, and return their findings, the worst first; collective.
 
+    After a run a check that raises an error does not lose the run: the error becomes a finding.
+
     Args:
         moment: "scene", "start", "end" or "failure" (`Moment`).
         subject: subject of the checks, such as the `Path` after a run (`Check`).
     """
-    return worst_first(finding for check in _registered[moment] for finding in check(subject))
+    call = _findings_or_error if moment in ("end", "failure") else _findings
+    return worst_first(finding for check in _registered[moment] for finding in call(check, subject))
+
+
+def _findings(check: Check[Any], subject: Any) -> list[Finding]:
+    """Return the findings of one check."""
+    return list(check(subject))
+
+
+def _findings_or_error(check: Check[Any], subject: Any) -> list[Finding]:
+    """Return the findings of one check; an error in it becomes a warning that names check and error."""
+    found: list[Finding] = []
+    try:
+        found.extend(check(subject))
+    except Exception as error:
+        name = getattr(check, "__name__", repr(check))
+        log.debug("the check %s failed", name, exc_info=True)
+        found.append(Finding("warning", name, f"the check {name!r} of the result failed: {error_text(error)}: what it"
+                                              f" looks for is unknown; the states of the run are complete",
+                             "Report the error, with the script."))
+    return found
+
+
+def error_text(error: BaseException) -> str:
+    """Return the class and the message of an error as one line of text."""
+    return " ".join(f"{type(error).__name__}: {error}".split())
 
 
 def worst_first(findings: Iterable[Finding]) -> list[Finding]:

@@ -180,6 +180,7 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         ConvergenceError: the run failed; without the traceback of the solver.
         InputError: a stage was refused during the run.
         Interrupted: Ctrl-C was pressed.
+        Exception: a function of the script failed, such as a material or a column; it has the `path`, too.
     """
     paths: list[Path] = []
 
@@ -201,6 +202,12 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         if isinstance(error, ConvergenceError) and error.diagnosis is not None:
             without_traceback = copy.copy(error)            # the diagnosis names the cause
             raise without_traceback from None
+        raise
+    except Exception as error:                              # such as a function of the script that fails in a state
+        path = first_with_states()
+        if path is not None:
+            error.path = path                               # type: ignore[attr-defined]
+            error.add_note(f"`error.path` has the {len(path)} states before it, up to {path.describe(path.last)}")
         raise
     except KeyboardInterrupt:
         path = first_with_states()

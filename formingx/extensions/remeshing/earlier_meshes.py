@@ -20,6 +20,9 @@ _OUTLINE_DISTANCE = 0.02
 """Distance from the outline over the length of an edge below which a point is moved onto it: new edges differ from old.
 """
 
+_CANDIDATES = 4
+"""Points of the outline among which the edge closest to a position is searched; two of them share a corner."""
+
 
 class MaterialPointProbe(Probe):
     """Probe of the displacement of material points since the start of a remeshed run.
@@ -111,8 +114,11 @@ class _OutlineProjection:
     """
 
     def __init__(self, problem: Any):
-        self._edges = Outline(problem.forms).reference_edges
+        outline = Outline(problem.forms)
+        self._edges = outline.reference_edges
         self._near = _OUTLINE_DISTANCE * np.linalg.norm(self._edges[:, 1] - self._edges[:, 0], axis=1)
+        start, end = outline.ends.T
+        self._previous, self._next = (np.argmax(a[:, None] == b, axis=1) for a, b in ((start, end), (end, start)))
 
     @cached_property
     def _tree(self) -> Any:
@@ -122,18 +128,37 @@ class _OutlineProjection:
 
     def __call__(self, x: np.ndarray) -> np.ndarray:
         """Return positions x, shape (n, 2), length, with points outside or near the outline projected onto it."""
-        edge, part = np.divmod(self._tree.query(x)[1], FINE_PIECES + 1)
+        edge, part = np.divmod(self._tree.query(x, k=_CANDIDATES)[1], FINE_PIECES + 1)
+        found = [self._closest(x, edges, parts / FINE_PIECES) for edges, parts in zip(edge.T, part.T)]
+        nearest = np.argmin([np.linalg.norm(offset, axis=1) for _, offset, _ in found], axis=0)
+        pick = np.arange(len(x))
+        edge = edge[pick, nearest]
+        s, offset, normal = (np.array(values)[nearest, pick] for values in zip(*found))
+        for end, neighbour in ((0.0, self._previous), (1.0, self._next)):     # at a corner both edges decide
+            other = self._closest(x, neighbour[edge], np.full(len(x), 1 - end), fixed=True)[2]
+            normal += np.where(s == end, other, 0.0)
+        outside = (normal * offset).sum(1) < 0
+        projected = outside | (np.linalg.norm(offset, axis=1) < self._near[edge])
+        return x + np.where(projected[:, None], offset, 0.0)
+
+    def _closest(self, x: np.ndarray, edge: np.ndarray, s: np.ndarray, fixed: bool = False) -> tuple[np.ndarray, ...]:
+        """Return the closest points on given edges: parameter, shape (n, 1), offset and outer normal, shape (n, 2).
+
+        Args:
+            x: positions, shape (n, 2), length.
+            edge: number of an edge for each position, shape (n,).
+            s: first guesses of the parameters, 0 at the start of an edge and 1 at its end, shape (n,).
+            fixed: True to keep the parameters.
+        """
         a, b, middle = np.moveaxis(self._edges[edge], 1, 0)
-        s = part[:, None] / FINE_PIECES
-        bend = 2 * (a + b - 2 * middle)
-        for _ in range(4):                                   # Newton's method for the closest point on the parabola
+        s, bend = s[:, None], 2 * (a + b - 2 * middle)
+        for _ in range(0 if fixed else 4):                   # Newton's method for the closest point on the parabola
             slope, offset = b - a + (2 * s - 1) * bend, _points_on_edges(a, b, middle, s) - x
             rate = (slope * slope + bend * 2 * offset).sum(1, keepdims=True)
             s = np.clip(s - (slope * offset).sum(1, keepdims=True) / rate, 0.0, 1.0)
         slope, offset = b - a + (2 * s - 1) * bend, _points_on_edges(a, b, middle, s) - x
-        outside = slope[:, 0] * offset[:, 1] - slope[:, 1] * offset[:, 0] > 0    # the body is to the left
-        projected = outside | (np.linalg.norm(offset, axis=1) < self._near[edge])
-        return x + np.where(projected[:, None], offset, 0.0)
+        normal = np.column_stack([slope[:, 1], -slope[:, 0]])           # the body is to the left
+        return s, offset, normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
 
 def _points_on_edges(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:

@@ -26,7 +26,8 @@ def dissipated_energy(segment: Segment, states: list[State], power: Quantity) ->
         The energy of the whole part, stress length^3; in plane strain stress length^2. It is 0 if no time passes.
     """
     before, state = states[-2:]
-    if not before.time < state.time:                         # as after remeshing
+    # with new step data only round-off is between the times: the body does not move
+    if before.setting != state.setting or not before.time < state.time:
         return 0.0
     time = (before.time + state.time) / 2
     if state.setting["rate"][-1]:
@@ -45,7 +46,9 @@ def dissipated_energy(segment: Segment, states: list[State], power: Quantity) ->
             history.advance(x, control)
         half = power.value(problem.x, control)
     a, b = (s.measures["dissipated_power"] for s in (before, state))
-    # the parabola through the three powers, at times that need not be even
     share = (time - before.time) / (state.time - before.time)
+    if not 0 < share < 1:                                    # a step of round-off
+        return (state.time - before.time) * (a + b) / 2
+    # the parabola through the three powers, at times that need not be even
     return (state.time - before.time) * (
         a * (3 - 1 / share) + half / (share * (1 - share)) + b * (3 - 1 / (1 - share))) / 6
