@@ -40,6 +40,7 @@ def test_standard_keeps_its_promise_in_the_cup(standard_cup):
     assert standard_cup.problem.n_unknowns < 1800
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["ribbed", "tray"])
 def test_draft_keeps_its_promise_over_sharp_edges_and_in_thick_sheets(name):
     """With one element through the sheet the wall over the rib is 7 % wrong."""
@@ -158,6 +159,7 @@ def test_edges_sharper_than_the_wall_and_thick_sheets_are_reported():
     assert severity == "note" and "thicker than a tenth" in text
 
 
+@pytest.mark.thorough
 def test_face_that_creases_between_sticking_points_is_reported(standard_cup):
     """A thick parison, whose outer face is shortened where it bends from the shoulder into the neck of a flask."""
     mould = fx.tools.bottle(radius=18.0, height=45.0, neck=8.5, shoulder=14.0, neck_height=10.0, base=-12.0,

@@ -81,6 +81,7 @@ def test_a_run_warns_and_check_predicts_it(caplog):
     assert "tests" not in caplog.text
 
 
+@pytest.mark.thorough
 def test_material_report_names_the_tested_range(tmp_path):
     data = fx.treloar1944()
     found = fx.fit(fx.Ogden, {"uniaxial": data["uniaxial"]})
@@ -90,6 +91,7 @@ def test_material_report_names_the_tested_range(tmp_path):
     assert "tested" not in RUBBER.report(tmp_path / "card.html").read_text()
 
 
+@pytest.mark.thorough
 def test_warning_for_a_sheet_in_three_dimensions():
     from formingx.extensions.fits.beyond_tests import strains_beyond_tests
     scene = fx.Scene(mesh=fx.mesh.sheet(fx.mesh.circle(10.0, part="quarter"), size=4.0), thickness=0.2,

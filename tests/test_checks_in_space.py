@@ -60,6 +60,7 @@ def test_moulds_wider_or_narrower_than_the_sheet(moulds, kind, scale, words):
         assert re.search(words, finding.text), finding.text
 
 
+@pytest.mark.thorough
 def test_a_sheet_is_blown_past_the_end_of_a_narrow_mould(moulds):
     """Below the pressure of the finding the overhang stays a shallow blister; above it, it is the thinnest place."""
     depth, wall = [], []

@@ -43,6 +43,7 @@ def test_both_forms_of_the_penalty_agree(eps):
     assert energies[0]["volume_error"] > 0.01 * eps
 
 
+@pytest.mark.thorough
 def test_unloaded_body_of_the_printed_penalty_is_not_free_of_stress():
     """(3.4.1) as printed rests at I3 = 1 - eps (c10 + 2 c01)/(2 mu): shrunk."""
     given = cylinder(fx.NeoHookean(c10=2.0), fx.DisplacementPenalty(eps=1e-2, stress_free=False))

@@ -18,6 +18,7 @@ def table(file, header, *columns):
     return str(file)
 
 
+@pytest.mark.thorough
 def test_overview_lists_every_demo():
     text = run("-m", "formingx")
     assert "  treloar" in text and "Inflate Treloar's rubber sheet" in text
@@ -35,6 +36,7 @@ def test_a_closed_output_pipe_is_no_error():
     assert (done.returncode, done.stderr) == (0, b"")
 
 
+@pytest.mark.thorough
 def test_demo_runs_with_its_options(tmp_path):
     text = run("-m", "formingx", "demo", "treloar", "--quick", "--out", tmp_path)
     assert "limit pressure" in text and (tmp_path / "summary.json").exists()
@@ -113,6 +115,7 @@ def test_check_of_a_file_that_is_not_python(text, words, tmp_path, capsys):
     assert re.search(f"script.py' {words}", error) and len(error.splitlines()) == 1
 
 
+@pytest.mark.thorough
 def test_unknown_command():
     done = subprocess.run([sys.executable, "-m", "formingx", "fly"], cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 2 and "invalid choice: 'fly'" in done.stderr and "Traceback" not in done.stderr

@@ -57,6 +57,7 @@ def test_mesh_refinement_softens_the_stuck_block():
     assert found[1] == pytest.approx(found[2], rel=5e-3)
 
 
+@pytest.mark.thorough
 def test_equal_layers_are_one_block():
     soft, same, stiff = (fx.MooneyRivlin(c10=c, c01=0.1 * c) for c in (1.0, 1.0, 10.0))
     layers = {"strip": HALF_HEIGHT / 2, "block": HALF_HEIGHT / 2}

@@ -429,6 +429,7 @@ def scene_with(contact, pressed="bottom"):
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure(pressed)], contacts=[contact])
 
 
+@pytest.mark.thorough
 def test_coulomb_friction_that_never_slides_equals_stick():
     """Coulomb's law with a coefficient that is never reached gives the numbers of stick, one node a step."""
     paths = [form(cup(friction, (20, 2), penalty=2e5, ramp=1e-5, nodes_per_step=1), 8.0, largest=0.02, length=0.02)

@@ -133,6 +133,7 @@ def told(path):
             float(len(path))]
 
 
+@pytest.mark.thorough
 def test_a_restarted_run_equals_an_uninterrupted_one(tmp_path):
     scene = pressed()
     whole = press(scene, checkpoint=tmp_path / "run")
@@ -195,6 +196,7 @@ def laid_on(layers, stays=0.1):
     return path, X[axis, 1], values[axis]
 
 
+@pytest.mark.thorough
 def test_a_warning_names_a_mesh_too_coarse_for_heat(caplog):
     """Right after it was laid on a tool; the estimate is within a factor of 3. Its layers are fine enough."""
     _, z, T = laid_on([2 ** (k / 3) for k in range(16)])
@@ -233,6 +235,7 @@ def test_a_warning_names_the_end_of_a_contact(caplog):
     assert errors[1] > 0.8 * errors[0] and errors[2] < 0.7 * errors[0], errors
 
 
+@pytest.mark.thorough
 def test_a_face_that_bridges_a_fillet_between_its_nodes_counts_as_touching():
     """All nodes of a sheet touch a cup whose lip has a small fillet; elements half as long through the wall agree."""
     mould = fx.tools.cup(radius=34.0, depth=14.0, mouth=1.0, fillet=8.0, lip=3.0, draft=5.0)

@@ -80,7 +80,8 @@ def blown(b):
     return scene, [fx.Stage("blow", control="air", until=fx.pressure(0.03), duration=1.0)]
 
 
-@pytest.mark.parametrize("build", (lambda b: disc(c=b), pushed, blown, lambda b: pushed(0.0, 0.3 + b)),
+@pytest.mark.parametrize("build", (
+    lambda b: disc(c=b), pushed, pytest.param(blown, marks=pytest.mark.thorough), lambda b: pushed(0.0, 0.3 + b)),
                          ids=("elastic", "contact", "relaxing", "friction"))
 def test_linearisation_error_is_of_second_order(build):
     """The error of the linearisation is of second order over two decades: elastic, in contact, in time, of friction."""
@@ -148,6 +149,7 @@ def test_wrong_arguments_of_designs_are_refused():
             run.spread({"height": wrong})
 
 
+@pytest.mark.thorough
 def test_results_name_unattainable_targets_and_the_reason():
     """Results name a wall, a volume and a minimum wall that the bounds make unattainable, and the reason."""
     design = fx.Design(programmed, {"h": fx.spline(2, start=0.0, low=-0.3, high=0.3)})
@@ -318,6 +320,7 @@ def test_covariance_of_a_fit():
         run.spread([0.1])
 
 
+@pytest.mark.thorough
 def test_report_shows_standard_deviations(tmp_path):
     run = fx.Design(disc, {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.1)}).run()
     text = run.report(tmp_path / "run.html", deviations={"h": 0.002}).read_text()
@@ -341,6 +344,7 @@ def test_minimum_weight():
     assert answer.best.wall.max() < 0.0125
 
 
+@pytest.mark.thorough
 def test_minimum_weight_keeps_a_parameter_without_effect():
     """A modulus changes no wall at a given height, but for round-off: the search leaves it at its start."""
     def build(h, modulus):
@@ -352,6 +356,7 @@ def test_minimum_weight_keeps_a_parameter_without_effect():
     assert answer.best.volume < 0.98 * answer.before.volume
 
 
+@pytest.mark.thorough
 def test_report(tmp_path):
     """Reports of a search and of a run are single files with pictures, bounds and parameters without effect."""
     design = fx.Design(lambda h, idle: programmed(h), {"h": fx.spline(4, 0.0, -0.04, 1.0), "idle": (1.0, 0.0, 2.0)})

@@ -51,6 +51,7 @@ def test_an_earlier_limit_point_is_not_named_as_cause():
         assert bool(list(diagnose._limit_point_findings(run))) is is_cause
 
 
+@pytest.mark.thorough
 def test_a_pressure_in_time_beyond_its_maximum():
     """The maximum is that of what is driven, and the singular tangent there no bifurcation."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.25, thickness=0.082, elements=(10, 1)), loads=[fx.Pressure("bottom")],
@@ -207,6 +208,7 @@ def test_ranks_give_the_same_diagnosis():
     assert two == pytest.approx(one, rel=1e-4)
 
 
+@pytest.mark.thorough
 def test_a_script_that_stops_in_an_error_ends():
     """Objects that Python frees while an error is on its way must not lock up the end of the program."""
     script = ("import sys; sys.path.insert(0, 'tests')\nfrom conftest import treloar\nimport formingx as fx\n"

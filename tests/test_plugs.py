@@ -52,6 +52,7 @@ def test_membrane_forces_scale_with_moduli_and_balance_at_the_edge():
         membrane_under_plug(8.0, **SHEET, friction="none")
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("plug", [case for cases in plug_extremes.CASES.values() for case in cases])
 def test_one_rule_for_all_meshes(plug):
     nodes = plug_extremes.mesh_for(plug).nodes_of("top")[::2, 0]         # ends of edges

@@ -69,6 +69,7 @@ def test_limit_point_of_treloars_sheet(space, error):
     assert path.counts.steps <= 25 and path.counts.iterations <= 150, path.counts
 
 
+@pytest.mark.thorough
 def test_pressure_jumps_between_layers_in_all_spaces():
     """Three spaces, one two-layer sheet; the mean pressures of the layers differ by what the layers' stresses do."""
     found = []

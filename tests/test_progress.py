@@ -49,6 +49,7 @@ import formingx
 """
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("error, lines", [("KeyboardInterrupt", 1), ("ValueError('x')", None)])
 def test_ctrl_c_while_it_is_imported(error, lines):
     """One line, and the status of an interrupt; another error keeps its traceback."""
@@ -60,6 +61,7 @@ def test_ctrl_c_while_it_is_imported(error, lines):
         assert "Traceback" in ended.stderr and ended.stderr.endswith("ValueError: x\n")
 
 
+@pytest.mark.thorough
 def test_importing_restores_the_exception_hook():
     script = "import sys, formingx; sys.exit(sys.excepthook is not sys.__excepthook__)"
     assert subprocess.run([sys.executable, "-c", script], cwd=ROOT).returncode == 0

@@ -50,12 +50,14 @@ def test_stress_at_the_pole_relaxes_to_equilibrium(law, tmp_path):
     assert "pole stress ratio" in (tmp_path / "run.html").read_text()
 
 
+@pytest.mark.thorough
 def test_no_stress_ratio_without_equilibrium_stress():
     once = Stage("at once", control="pull", until=fx.travel(0.1))
     assert "pole_stress_ratio" not in run(block(RUBBER), once).columns
     assert "pole_stress_ratio" not in run(block(fx.Viscoelastic(None, BRANCHES)), once).columns
 
 
+@pytest.mark.thorough
 def test_ratio_of_a_membrane_with_layers():
     """Layers have weights by thickness; at a sudden stretch of 2 each has its own moduli."""
     mesh = fx.mesh.disc(radius=1.0, thickness={"stiff": 0.01, "soft": 0.03}, elements=(4, 1))
@@ -82,6 +84,7 @@ def test_elastic_stretch_of_branches(law):
     assert 1.001 < held["elastic_stretch_1"].max() < held["elastic_stretch_2"].min() < 1.999
 
 
+@pytest.mark.thorough
 def test_a_layer_without_branches_has_no_elastic_stretch():
     mesh = fx.mesh.disc(radius=1.0, thickness={"relaxing": 0.5, "rubber": 0.5}, elements=(1, 1))
     path = run(block({"relaxing": POLYMER, "rubber": RUBBER}, mesh), AT_ONCE)
@@ -102,6 +105,7 @@ def test_a_cubic_in_time_is_predicted_exactly():
     assert [s.time for s in predictor.recent_states(states, 1.6, predictor.CUBIC)] == [0.7, 1.2 + 1e-9]
 
 
+@pytest.mark.thorough
 def test_tangents_that_are_kept_change_no_result():
     """A sheet inflated to a constant volume: fewer tangents than states, and the results of tighter tolerances."""
     scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), materials=POLYMER,
@@ -132,6 +136,7 @@ print(path["pole_stress_ratio"][0])
 """
 
 
+@pytest.mark.thorough
 def test_nothing_is_compiled_for_other_constants():
     """Each runs in its own process: UFL sorts terminals by numbers as text, so 9 and 10 would make another form."""
     run_python("-c", CONSTANTS, 0.05, 0.3, 0.5, 0)

@@ -91,6 +91,7 @@ def test_contact_events_are_not_predicted(monkeypatch):
     assert len(path.segments) > 1 and not any(segment.problem.limit.predicts_events for segment in path.segments)
 
 
+@pytest.mark.thorough
 def test_a_failed_new_mesh_is_not_part_of_the_path(monkeypatch):
     """The path of a run that fails at once on its new mesh ends before that."""
     from formingx.extensions.remeshing import remeshing
@@ -264,7 +265,7 @@ def twice(monkeypatch, **after):
 
 RELAX = [fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 0.3)]),
          pytest.param(fx.TransientNetwork(fx.NeoHookean(c10=0.2), [(1.0, 0.3)]), marks=pytest.mark.slow),
-         fx.KBKZ([(1.0, 0.3), (0.5, 3.0)], damping=fx.PSM(10.0, 0.5))]
+         pytest.param(fx.KBKZ([(1.0, 0.3), (0.5, 3.0)], damping=fx.PSM(10.0, 0.5)), marks=pytest.mark.thorough)]
 
 
 @pytest.mark.parametrize("material", RELAX, ids=lambda one: type(one).__name__)
@@ -299,6 +300,7 @@ def test_internal_variables_are_transferred_to_new_meshes(monkeypatch, tmp_path,
             same(run(remesh=remesh, start=fx.load(tmp_path / "run", scene, state=state)), path)
 
 
+@pytest.mark.thorough
 def test_supports_continue_on_new_meshes(monkeypatch):
     """One that is driven goes on; a hinge holds the mean of its face."""
     from formingx.extensions.remeshing import remeshing
@@ -322,6 +324,7 @@ def test_supports_continue_on_new_meshes(monkeypatch):
         assert path.last.measures[name] == pytest.approx(whole.last.measures[name], rel=2e-3), name
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("heat", [False, True])
 def test_constants_and_temperatures_follow_the_material(monkeypatch, tmp_path, heat):
     """A thick tube whose modulus depends on R and on the temperature, which is given, or falls from outside."""

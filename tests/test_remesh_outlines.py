@@ -50,6 +50,7 @@ def test_an_outline_that_crosses_itself_ends_the_run_with_a_reason(monkeypatch):
     assert error.value.path["travel"][-1] > 0.1
 
 
+@pytest.mark.thorough
 def test_smaller_corners_mesh_the_same_body():
     path = pressed(size=0.15, corner=0.03)
     assert any(state.kind == "remesh" for state in path.states)

@@ -161,6 +161,7 @@ def test_a_shorter_path_deletes_no_stored_state(tmp_path):
         assert sorted(map(str, folder.rglob("*"))) == before
 
 
+@pytest.mark.thorough
 def test_killed_at_any_moment(whole, tmp_path):
     _, scene, path = whole["stick"]
     rng = np.random.default_rng(int.from_bytes(os.urandom(4), "little"))
@@ -397,6 +398,7 @@ fx.trace(make(), until=until, progress=False, checkpoint=sys.argv[1], record={"c
 """
 
 
+@pytest.mark.thorough
 def test_an_interrupted_run_prints_one_line_and_can_be_continued(tmp_path):
     done = subprocess.run([sys.executable, "-c", INTERRUPTED, str(tmp_path / "run")], cwd=ROOT, capture_output=True,
                           text=True, timeout=300)

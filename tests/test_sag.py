@@ -75,6 +75,7 @@ def test_an_unreachable_sag_is_reported():
         fx.sag(-1.0)
 
 
+@pytest.mark.thorough
 def test_oven_quick(tmp_path):
     """Sag grows to its limit; the skins are hotter than the middle."""
     run("demos/oven.py", "--out", tmp_path, "--quick")

@@ -3,6 +3,7 @@
 import types
 
 import numpy as np
+import pytest
 import ufl
 from dolfinx import fem
 from test_cooling import pressed
@@ -52,6 +53,7 @@ def test_two_simultaneous_runs_of_a_scene():
     assert [s.measures for s in second.states] == [s.measures for s in first.states]
 
 
+@pytest.mark.thorough
 def test_a_constant_of_the_mesh_keeps_the_mesh():
     """A scene divides a sheet anew for its tools, unless a material constant is a UFL expression of the mesh."""
     disc = fx.mesh.disc(radius=10.0, thickness=0.5)

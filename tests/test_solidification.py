@@ -49,6 +49,7 @@ def test_solidified_block(tmp_path):
     assert drawn(tmp_path / "set_block.png")
 
 
+@pytest.mark.thorough
 def test_relaxing_base_solidifies():
     """A released block balances rubber, glass and the branch with its elastic strain at the release."""
     tau, mu, G = 4.0, 1.5, 300.0
