@@ -8,6 +8,8 @@ from conftest import ROOT
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import damaged_files  # noqa: E402
 
+pytestmark = pytest.mark.thorough
+
 KINDS = ("msh22", "msh41", "msh22b", "msh41b", "text", "geo", "dxf", "mshtool", "csv", "tests", "heat", "checkpoint")
 
 

@@ -22,6 +22,7 @@ PAGES = [p for p in sorted(DOCS.rglob("*.md")) if not MADE & {*p.parts} and "```
 NOTEBOOKS = sorted(DOCS.glob("notebooks/*.ipynb"))
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.relative_to(DOCS).with_suffix("").as_posix())
 def test_blocks_run(page, tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(findings, "_registered", {at: [*checks] for at, checks in findings._registered.items()})
@@ -34,6 +35,7 @@ def test_blocks_run(page, tmp_path, monkeypatch, capsys):
         assert drawn(tmp_path / name) and (page.parent / "pictures" / name).is_file(), f"docs/run_page.py stores {name}"
 
 
+@pytest.mark.thorough
 def test_thumbnails_are_panels_of_the_pictures():
     sys.path.insert(0, str(DOCS))
     import make_thumbnails
@@ -46,6 +48,7 @@ def test_thumbnails_are_panels_of_the_pictures():
         assert max(ImageStat.Stat(off).mean) < 1.5, f"run docs/make_thumbnails.py: {name}"
 
 
+@pytest.mark.thorough
 def test_pictures_of_pages_are_all_shown():
     for folder in DOCS.glob("*/pictures"):
         pages = "".join(page.read_text() for page in folder.parent.glob("*.md"))
@@ -113,6 +116,7 @@ def test_messages_are_quoted_as_they_are():
     assert len(parts) > 80 and not sorted(part for part in parts if part not in said)
 
 
+@pytest.mark.thorough
 def test_every_demo_is_in_the_gallery():
     """With a picture, a line and its command; the pictures are there, and its script is where the links lead."""
     rows = [[cell.strip() for cell in line.strip().strip("|").split("|")]
@@ -129,6 +133,7 @@ def test_every_demo_is_in_the_gallery():
     assert sorted(found) == sorted(demos) and all(f.is_file() for f in found.values())
 
 
+@pytest.mark.thorough
 @pytest.mark.quick
 def test_sphinx_warns_of_nothing(tmp_path):
     run("-m", "sphinx", "-W", "--keep-going", "-q", "docs", tmp_path / "html")

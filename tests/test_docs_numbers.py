@@ -17,6 +17,8 @@ from validation_rows import Row  # noqa: E402
 
 import formingx as fx  # noqa: E402
 
+pytestmark = pytest.mark.thorough
+
 STORED = json.loads(make_pages.STORED.read_text())
 
 

@@ -9,6 +9,8 @@ import re
 import pytest
 from conftest import ROOT
 
+pytestmark = pytest.mark.thorough
+
 LINK = re.compile(r"(?<!!)\[((?:!\[[^\]]*\]\([^)]*\)|[^\[\]])*)\]\(([^)\s]+)\)")
 README = ROOT / "README.md"
 CLICKS = 3

@@ -96,6 +96,7 @@ def drawn_and_let_go(branches):
     return path.profile().top[-1, 0] / 4e-3, path
 
 
+@pytest.mark.thorough
 def test_a_solidified_part_keeps_its_shape_and_shrinks():
     """A branch that is glassy when cold (200 times as stiff) and has no time when hot freezes a sheet as it is drawn.
 

@@ -17,6 +17,7 @@ NEAR = {"eps": 2e-4, "stretch": 2e-4, "I1 to I2": 2e-4, "Ogden exponent": 5e-4, 
         "r0/h0 2000, SimplySupported": 1e-6, "r0/h0 2000, Clamped": 1e-2}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("row", list(extremes.rows(quick=True)), ids=lambda row: row[1])
 def test_extreme(row):
     found = extremes.run(*row)

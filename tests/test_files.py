@@ -157,6 +157,7 @@ def test_on_two_ranks(inflated, tmp_path):
         assert np.abs(one[name]).sum() == pytest.approx(np.abs(two[name]).sum(), rel=1e-8)
 
 
+@pytest.mark.thorough
 @pytest.mark.quick
 def test_animation(formed, tmp_path):
     formed.animate(tmp_path / "run.gif", frames=7, seconds=2.0)
@@ -185,6 +186,7 @@ def test_an_animation_of_a_tall_part_is_narrow(tmp_path):
         assert film.size == (680, 420)                     # 2.8 and 4 inches, not 6 and 4
 
 
+@pytest.mark.thorough
 @pytest.mark.skipif(shutil.which("ffmpeg") is None, reason="no ffmpeg")
 def test_an_animation_is_mp4(formed, tmp_path):
     """Seven moving frames in two seconds, and the last one for a second more, as ffmpeg's own programs read them."""
@@ -250,6 +252,7 @@ def test_every_stage_has_its_curve():
         "process_time", "mould_force")
 
 
+@pytest.mark.thorough
 def test_solids_are_closed_and_hold_the_volume(formed, tmp_path):
     """Every edge of the triangles belongs to two of them, run both ways; the volume is the part's."""
     points, triangles = solid(formed.profile(), True, 600)
@@ -578,6 +581,7 @@ def test_warnings(formed, inflated):
     assert [w[:24] for w in record.warnings()] == ["The body penetrates a to", "The mass changes by up t"]
 
 
+@pytest.mark.thorough
 def test_report_of_a_warm_process(tmp_path, capsys):
     """Temperatures, conductances, values of functions without a name, what limited the steps; of a checkpoint, too."""
     sheet = fx.mesh.disc(radius=2.0, thickness=0.3, elements=(8, 1))
@@ -699,6 +703,7 @@ def test_unwritable(inflated, write):
         getattr(inflated, write)(f"/proc/run.{suffix}", **{"frames": 2} if write == "animate" else {})
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("name", ["to_csv", "report", "animate", "view3d", "mesh"])
 def test_writing_keeps_pipes_links_and_file_modes(inflated, tmp_path, name):
     """What is no regular file is written to; a link stays one, a mode and its file too; nothing is left beside."""

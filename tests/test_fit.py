@@ -135,6 +135,7 @@ def test_standard_errors_are_the_scatter_of_the_fits(relative):
         fits[0].intervals(1)
 
 
+@pytest.mark.thorough
 def test_undetermined_constants_are_named():
     """Undetermined are a limit beyond the tests, an unnecessary second term, and a constant of I2 at small strain."""
     neo_hookean = measured(fx.NeoHookean(c10=0.3), reach=2.0)
@@ -205,6 +206,7 @@ def test_no_file(tmp_path):
         fx.fit(fx.Viscoelastic, tmp_path / "t.csv")
 
 
+@pytest.mark.thorough
 def test_demo(tmp_path):
     printed = run("demos/fit_treloar.py", "--quick", "--out", tmp_path)
     summary = json.loads((tmp_path / "summary.json").read_text())

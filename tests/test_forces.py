@@ -63,6 +63,7 @@ def test_a_ball_without_friction_never_pulls():
         fx.trace(pushed(), until=fx.force(-1.0))
 
 
+@pytest.mark.thorough
 def test_a_rough_ball_pulls_only_where_it_is_withdrawn_or_another_load_acts():
     """A run that continues another, and a run with a pressure, try it."""
     with pytest.raises(fx.InputError, match="which pushes it back"):

@@ -200,6 +200,7 @@ if path.problem.comm.rank == 0:
         np.testing.assert_allclose(two, one, rtol=1e-7, atol=1e-10)
 
 
+@pytest.mark.thorough
 def test_a_frictional_run_continues_from_a_checkpoint(tmp_path):
     """A run with sliding points continues as if it had not been interrupted."""
     whole = fx.trace(pushed(0.3, 0.2), until=fx.travel(0.6), intermediate=[fx.travel(0.4)], progress=False)
@@ -232,6 +233,7 @@ def test_walls_of_a_rough_cup():
         assert mean == pytest.approx(should, rel=0.01)
 
 
+@pytest.mark.thorough
 def test_plug_tray_quick(tmp_path):
     """Results are of the whole tray: its weight equals the sheet's, and half and quarter models agree to 0.5 %."""
     found = summary("plug_tray", tmp_path, "--quick")

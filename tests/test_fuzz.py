@@ -2,11 +2,14 @@
 
 import sys
 
+import pytest
 from conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import fuzz  # noqa: E402
 import reliability  # noqa: E402
+
+pytestmark = pytest.mark.thorough
 
 
 def test_random_calls_give_results_or_clear_errors():

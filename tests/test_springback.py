@@ -100,6 +100,7 @@ def test_wrong_springback_arguments_are_refused(path):
         membrane.springback()
 
 
+@pytest.mark.thorough
 def test_setting_pot_quick(tmp_path):
     """What sets keeps its shape and shrinks; the rubber goes back."""
     run("demos/setting_pot.py", "--out", tmp_path, "--quick")
@@ -140,7 +141,8 @@ def chilled():
     return of
 
 
-@pytest.mark.parametrize("name", WARM)
+@pytest.mark.parametrize("name", [
+    "stiffens", "sets", pytest.param("relaxes and sets", marks=pytest.mark.thorough)])
 def test_faces_of_a_warm_part_may_be_chilled_at_once(chilled, name):
     """What stiffens or sets as the faces go to 20 C: elastic parts go to their free size, set ones keep their shape."""
     path = chilled(name)
@@ -153,6 +155,7 @@ def test_faces_of_a_warm_part_may_be_chilled_at_once(chilled, name):
         assert 0.5 * 7e-5 * 130 < part.shrinkage < 7e-5 * 130 and abs(part.springback) < 0.01 * part.height
 
 
+@pytest.mark.thorough
 def test_sudden_chill_is_the_limit_of_a_large_conductance(chilled, monkeypatch):
     part = chilled("sets").springback(20.0, accuracy="draft")
     monkeypatch.setattr(cooling, "_SUDDEN_CONDUCTANCE", 1e3)

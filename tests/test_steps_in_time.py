@@ -44,6 +44,7 @@ def test_a_target_at_a_corner_of_a_table(corner):
         assert met.measures["travel"] == pytest.approx(np.interp(corner, *np.transpose(QUICK)), abs=1e-9)
 
 
+@pytest.mark.thorough
 def test_step_control_is_restored_from_any_state(tmp_path):
     """From any state, under a step control of one's own, the very same path goes on."""
     scene = sheet()
@@ -80,6 +81,7 @@ def test_accuracy_is_kept_for_any_relaxation_time(law, tau, target, accuracy, pr
     assert np.abs(found - exact).max() < promised * np.abs(exact).max() and len(path) < 300
 
 
+@pytest.mark.thorough
 def test_a_file_without_the_motion_of_a_material_is_refused():
     """Each internal variable must be in the file."""
     path = run(block(fx.TransientNetwork(None, [(1.0, 0.1)])), Stage("pull", amplitudes={"pull": [(0, 0), (1, 0.5)]}),
@@ -123,7 +125,7 @@ COOLED = {"elastic": (fx.NeoHookean(c10=STIFFENS), 0.05),
           "relaxing": (fx.Viscoelastic(fx.NeoHookean(c10=STIFFENS), [(STIFFENS, 0.3)], shift=fx.WLF(8, 250, 150)), 0.1)}
 
 
-@pytest.mark.parametrize("name", COOLED)
+@pytest.mark.parametrize("name", ["elastic", pytest.param("relaxing", marks=pytest.mark.thorough)])
 def test_accuracy_is_kept_while_a_body_cools(name):
     """A sheet that is blown and held in cold air; nothing but materials controlled the steps before (2.4 % off)."""
     material, pressure = COOLED[name]

@@ -157,6 +157,7 @@ def stack():
     return fx.trace(scene, until=fx.pole_height(14.0))
 
 
+@pytest.mark.thorough
 def test_traction_is_continuous_across_interfaces_and_pressure_is_not(stack):
     field, pressure = stack.stress(), stack.last.measures["pressure"]
     R = np.linspace(0, 15, 16)

@@ -82,6 +82,7 @@ def test_homogeneous_and_unloaded_states_have_no_error():
     assert peak.converged and peak.value == pytest.approx(2 * (1.5**2 - 1 / 1.5), rel=1e-8)
 
 
+@pytest.mark.thorough
 def test_peaks(caplog):
     """A hinged sheet's peak is at its pole, the same on all meshes; that in a clamp's corner never converges."""
     values = []

@@ -203,6 +203,7 @@ def test_an_unknown_column_is_named_with_the_known_ones(here):
     assert found.runs[0].error == "InputError: measure 'f': column 'presure' is not known; known: 'g'"
 
 
+@pytest.mark.thorough
 def test_runs_in_processes():
     """A neo-Hookean sheet's pressure is proportional to its modulus."""
     found = fx.study(inflate, {"modulus": [1.0, 3.0]}, {"p": "pressure"}, workers=2, progress=False)

@@ -32,6 +32,7 @@ def parts():
     return {part: inflated(part) for part in HELD}
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("part, factor", [("half", 2), ("quarter", 4)])
 def test_part_of_a_sheet_in_space_gives_results_of_the_whole(parts, part, factor):
     path, whole = parts[part], parts["whole"]
@@ -173,6 +174,7 @@ def test_report_of_a_checkpoint_knows_the_planes(tmp_path):
         fx.load(tmp_path / "run", other.with_mesh(other.mesh))
 
 
+@pytest.mark.thorough
 def test_report_in_space_draws_the_whole_part_and_its_tool(parts, tmp_path):
     """The sheet's triangles, frame by frame, with its images; the box, which is whole, once."""
     from formingx.extensions.space import show

@@ -91,7 +91,8 @@ def test_constants_follow_a_temperature_that_changes():
     assert np.allclose(c10.x.array, 2.0)
 
 
-@pytest.mark.parametrize("kind", [fx.Viscoelastic, fx.TransientNetwork])
+@pytest.mark.parametrize("kind", [
+    fx.Viscoelastic, pytest.param(fx.TransientNetwork, marks=pytest.mark.thorough)])
 def test_time_temperature_superposition(kind):
     """sigma(T, t) = sigma(T0, t/aT): a whole scene at T, aT times as fast, follows the same path."""
     shift, T = fx.WLF(8.86, 101.6, 150.0), 158.0

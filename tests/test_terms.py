@@ -236,6 +236,7 @@ def test_where_constants_must_be_numbers():
     assert layered(varies).shear_modulus("low") == pytest.approx(2 * (1 + 2.0), rel=0.1)
 
 
+@pytest.mark.thorough
 def test_the_identity_of_a_scene_sees_its_fields():
     from formingx.results.files.description import describe, differences
     def about(f):

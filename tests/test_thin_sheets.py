@@ -49,6 +49,7 @@ def over_lip(**options):
     return fx.trace(scene, until=fx.pressure(0.1), progress=False)
 
 
+@pytest.mark.thorough
 def test_a_step_ends_before_the_closures_after_a_separation(caplog):
     """A point at the lip separates between two closures of a step; before, the wall there was wrong by 3 %.
 
@@ -117,6 +118,7 @@ def blown_off(friction, material=None, travel=12.0, pressure=0.03, **mesh):
                                   fx.Stage("air", control="air", until=fx.pressure(pressure))], progress=False)
 
 
+@pytest.mark.thorough
 def test_a_sheet_peeled_off_a_sticking_plug_is_reported():
     """Friction of 1 gives the same sheet in a third of the states: real plugs do not hold what hardly presses on them.
     """
@@ -137,6 +139,7 @@ def in_cup(nodes_per_step=None):
     return fx.trace(scene, until=fx.pressure(0.14156), progress=False)
 
 
+@pytest.mark.thorough
 def test_the_arc_length_of_a_predicted_closure_converges():
     """Where only the positions of points converge, the wall at the pole is wrong by 0.45 %."""
     assert in_cup().profile().thickness == pytest.approx(in_cup(1).profile().thickness, rel=2e-3)
