@@ -59,7 +59,8 @@ def test_second_variation_at_n_0_is_the_tangent(make, until):
 @pytest.mark.parametrize("material", [
     fx.NeoHookean(c10=1.0), fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0)),
     pytest.param(fx.Gent(mu=2.0, Jm=8.0), marks=pytest.mark.thorough),
-    pytest.param(fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 2.0)]), marks=pytest.mark.thorough)], ids=lambda m: type(m).__name__)
+    pytest.param(fx.Viscoelastic(fx.NeoHookean(c10=0.5), branches=[(1.0, 2.0)]), marks=pytest.mark.thorough)],
+    ids=lambda m: type(m).__name__)
 def test_rigid_motions_have_no_energy(material):
     """Torsion and a shift across the axis, which frictionless plates leave free, of a body that is compressed."""
     path = fx.trace(column(1.0, material, (3, 6)), until=fx.travel(-0.5), progress=False)
