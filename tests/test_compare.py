@@ -125,6 +125,7 @@ def test_units(tmp_path):
     assert csv_files.conversion("cm3", "m3") == pytest.approx(1e-6)
 
 
+@pytest.mark.thorough
 def test_run_against_hand_coded_solver(tmp_path):
     """A run agrees with the coarse curve of a hand-coded program past the pressure maximum, and with its nodes."""
     scene = treloar((10, 1), fx.PinnedNode(1.25, 0.041),

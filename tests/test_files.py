@@ -458,6 +458,7 @@ def test_runs_with_and_without_time_side_by_side(formed, tmp_path):
     assert report.of_path(timed).control(1) == "process_time" and report.of_path(formed).control(1) == "pressure"
 
 
+@pytest.mark.thorough
 def test_a_sheet_that_creeps_under_its_weight(tmp_path):
     """A run without a controlled load or tool: a report, and an animation of the pole height over time."""
     creeps = fx.TransientNetwork(fx.NeoHookean(c10=1e-6), [(1.0, 2.0)])

@@ -92,6 +92,7 @@ def test_treloar():
     assert fx.treloar1944()["uniaxial"][1][-1] == 6.3176        # a caller cannot spoil it
 
 
+@pytest.mark.thorough
 def test_ogden_on_treloar():
     """Three terms fit better than the constants of Ogden (1972); a fit that starts from these finds no better ones."""
     data = fx.treloar1944()

@@ -62,6 +62,7 @@ def test_initial_temperatures_given_in_all_ways_agree(heated, tmp_path):
     assert np.ptp(cooled.line_profile()[1]) < np.ptp(heated.line_profile()[1][-1]) / 3
 
 
+@pytest.mark.thorough
 def test_celsius_and_kelvin_are_the_same_run():
     """So is a run in millimetres."""
     found = {}

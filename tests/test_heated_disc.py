@@ -20,6 +20,7 @@ def test_theory_of_an_even_membrane_is_the_same_both_ways():
     assert np.interp(1.0, b.R, b.thickness_ratio) == pytest.approx(np.interp(1.0, a.R, a.thickness_ratio), rel=1e-5)
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("options, allowed", [
     (("--quick",), {"membrane": (2e-4, 1e-3, 1e-3), "solid": (1e-3, 5e-3, 1e-2)}),
     pytest.param((), {"membrane": (1e-5, 1e-4, 1e-4), "solid": (2e-4, 1e-3, 5e-3)}, marks=pytest.mark.slow),

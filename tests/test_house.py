@@ -1,6 +1,7 @@
-"""The structure of the package: the order of folders in imports, without circles, and rules for all files."""
+"""The structure of the package: the order of folders in imports, without circles."""
 
 import ast
+import functools
 
 from conftest import ROOT
 
@@ -21,11 +22,22 @@ def name_of(file):
 MODULES = {name_of(file): file for file in FILES}
 
 
+@functools.cache
+def tree_of(file):
+    """Syntax tree of a file."""
+    return ast.parse(file.read_text())
+
+
+@functools.cache
 def imports(file):
     """Modules of the package that a file imports, inside functions too."""
+    return list(_imports(file))
+
+
+def _imports(file):
     here = name_of(file).split(".") if name_of(file) else []
     package = here if file.name == "__init__.py" else here[:-1]
-    for node in ast.walk(ast.parse(file.read_text())):
+    for node in ast.walk(tree_of(file)):
         if isinstance(node, ast.ImportFrom) and node.level:
             base = package[:len(package) - node.level + 1] + (node.module.split(".") if node.module else [])
             for alias in node.names:
@@ -73,67 +85,10 @@ def test_no_circle():
 
 def test_private_names_are_not_imported():
     """No file imports a name from another that begins with an underscore (the modules that do are not names)."""
-    found = {(name_of(file), alias.name) for file in FILES for node in ast.walk(ast.parse(file.read_text()))
+    found = {(name_of(file), alias.name) for file in FILES for node in ast.walk(tree_of(file))
              if isinstance(node, ast.ImportFrom) and node.level and node.module for alias in node.names
              if alias.name.startswith("_")}
     assert found == set()
-
-
-def test_no_file_is_long():
-    long = {name_of(file): n for file in FILES if (n := len(file.read_text().splitlines())) > 450}
-    assert long == {}
-
-
-def test_tuned_numbers_have_a_name_each():
-    """No module begins with a tuple of numbers: each has a line and a word of its own, or is a field of a dataclass.
-
-    Those of the solver are all fields; any other is said what it is, on its line or the next.
-    """
-    codes = {"physics.supports", "solve.linear", "solve.predictor"}     # indices, counts
-    tops = [(name_of(file), node) for file in FILES for node in ast.parse(file.read_text()).body]
-    found = {(name, ast.unparse(node.targets[0])) for name, node in tops
-             if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Tuple) and name not in codes
-             and isinstance(node.value, ast.Tuple) and all(isinstance(n, ast.Constant | ast.UnaryOp) and isinstance(
-                 ast.literal_eval(n), int | float) for n in node.value.elts)}
-    found |= {(name, ast.unparse(node.targets[0])) for name, node in tops if name.startswith("solve.")
-              and isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant)
-              and isinstance(node.value.value, int | float) and ast.unparse(node.targets[0]) != "SAME_TIME"}
-    for file in FILES:
-        lines, body = file.read_text().splitlines(), ast.parse(file.read_text()).body
-        for node, following in zip(body, [*body[1:], None]):
-            said = "#" in lines[node.lineno - 1] or isinstance(following, ast.Expr)
-            if (isinstance(node, ast.Assign) and isinstance(node.value, ast.Constant) and not said
-                    and isinstance(node.value.value, int | float)):
-                found.add((name_of(file), ast.unparse(node.targets[0])))
-    assert found == set()
-
-
-GIVEN = {"STEFAN_BOLTZMANN", "GAS_CONSTANT", "_PSI", "_KG_PER_CM2", "FORMAT", "_LONGEST", "COORDINATES", "components",
-         "dimension_of_volume", "quadrature_degree", "_DENSITY_OF_OSMIUM", "_power", "_STRESS_ORDER", "DIGITS",
-         "PRINTED_ROWS"}
-"""Constants of physics (the densest material), formats (digits and rows of output), dimensions and powers of a law, and
-the order of the stress of quadratic elements: they are not tuned."""
-
-
-def is_number(node):
-    node = node.operand if isinstance(node, ast.UnaryOp) else node
-    return isinstance(node, ast.Constant) and type(node.value) in (int, float) and node.value != 0
-
-
-def test_the_count_of_tuned_numbers_only_falls():
-    """Numbers with a name: constants of modules, and defaults of fields (also those of users) that are not zero."""
-    found = []
-    for file in FILES:
-        tops = ast.parse(file.read_text()).body
-        classes = [node for node in tops if isinstance(node, ast.ClassDef)
-                   and not any("Enum" in ast.unparse(base) for base in node.bases)]
-        fields = [line for node in classes for line in node.body]
-        for line in (line for line in (*tops, *fields) if isinstance(line, ast.Assign | ast.AnnAssign)):
-            name = ast.unparse(line.targets[0] if isinstance(line, ast.Assign) else line.target)
-            values = line.value.elts if isinstance(line.value, ast.Tuple) else [line.value]
-            if name not in GIVEN and values and all(map(is_number, values)):
-                found += [(name_of(file), name)] * len(values)
-    assert len(found) <= 270
 
 
 def members(tree):
@@ -147,7 +102,7 @@ def test_the_solver_sees_equations_alone():
     allowed = members(ast.parse((PACKAGE / "solve" / "equations.py").read_text()))
     found = set()
     for file in (PACKAGE / "solve").glob("*.py"):
-        tree = ast.parse(file.read_text())
+        tree = tree_of(file)
         for node in ast.walk(tree):
             if isinstance(node, ast.Import) and any(a.name.split(".")[0] == "ufl" for a in node.names):
                 found.add((file.name, "ufl"))
@@ -159,17 +114,3 @@ def test_the_solver_sees_equations_alone():
                 if node.attr == "forms" or owner in ("problem", "_problem", "equations") and node.attr not in allowed:
                     found.add((file.name, node.attr))
     assert found == set()
-
-
-def test_protocols_have_types_for_all_arguments():
-    """No argument or result of an interface is just anything, but the history variables and matplotlib's objects."""
-    histories = {"get", "put.variables", "save.variables", "load", "transfer", "transfer.variables", "transfer.source"}
-    found = set()
-    for file in (file for file in FILES if name_of(file) != "figures"):
-        for kind in (node for node in ast.walk(ast.parse(file.read_text())) if isinstance(node, ast.ClassDef)):
-            if any(ast.unparse(base) == "Protocol" for base in kind.bases):
-                for call in (node for node in kind.body if isinstance(node, ast.FunctionDef)):
-                    said = {f"{call.name}.{arg.arg}": arg.annotation for arg in call.args.args}
-                    said[call.name] = call.returns
-                    found |= {(kind.name, name) for name, note in said.items() if getattr(note, "id", "") == "Any"}
-    assert found <= {("History", name) for name in histories}

@@ -224,6 +224,7 @@ def test_forces_on_a_plug_do_not_depend_on_the_steps_and_its_work_is_accounted_f
         assert share_of_friction(path) < 1 + 1e-6
 
 
+@pytest.mark.thorough
 def test_a_sheet_without_friction_snaps_off_an_edge_too():
     """Elements longer than the edge: no step is short enough where a node leaves it, and the plug moves on."""
     made = plugs.scene(10.0, 0.1, 2.5, 0.05, fx.MooneyRivlin(c10=0.4, c01=0.04), "frictionless", (40, 1),

@@ -167,7 +167,7 @@ def test_sum_of_powers_in_high_precision(alpha):
                 assert np.linalg.norm(part - exact) < (5e-14 if ratio < 0.999 else 1e-10) * np.linalg.norm(exact)
 
 
-@pytest.mark.parametrize("alpha", [-2.0, 1.3, 2.0, 5.0])
+@pytest.mark.parametrize("alpha", [-2.0, 1.3, *(pytest.param(a, marks=pytest.mark.thorough) for a in (2.0, 5.0))])
 def test_powers_for_every_perturbation(alpha):
     """Derivatives by all nine entries of F, where two, three or no stretches are equal."""
     mp = pytest.importorskip("mpmath")

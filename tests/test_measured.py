@@ -5,6 +5,8 @@ import pytest
 from conftest import drawn
 from test_demos import summary
 
+pytestmark = pytest.mark.thorough
+
 STRAINS = ("0.25", "0.5", "1", "1.5", "2", "2.5")
 
 

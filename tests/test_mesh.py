@@ -283,6 +283,7 @@ boundaries: axis (2 edges), rim (2 edges), bottom (6 edges), top (6 edges)"""
     assert {"material of b      NeoHookean(c10=1.0)", "load 1             Pressure('bottom') (driven)"} <= set(lines)
 
 
+@pytest.mark.thorough
 def test_a_mesh_prints_no_round_off():
     """The axis of a body that was meshed anew is at R = 0."""
     path = fx.trace(treloar((6, 1)), until=fx.pole_height(0.6), progress=False)

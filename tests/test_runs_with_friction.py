@@ -75,6 +75,7 @@ def test_a_block_pressed_to_a_fifth_of_its_height():
     assert law_is_kept(path) < 1 + 1e-6
 
 
+@pytest.mark.thorough
 def test_a_parison_is_blown_into_a_bottle_without_friction():
     """Past the edge under its neck, where contact leaves no next state; the volume has to grow with the pressure."""
     bottle = tools.bottle(radius=5.75, height=14.0, neck=2.2, shoulder=2.5, neck_height=1.5, base=-2.95, fillet=0.78,

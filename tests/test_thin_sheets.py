@@ -167,6 +167,7 @@ def in_bowl(nodes_per_step=None):
     return fx.trace(scene, until=fx.pressure(0.1754), progress=False)
 
 
+@pytest.mark.thorough
 def test_predicted_closures_beside_a_clamp_are_in_equilibrium():
     """A point on a lip hardly moves along it: its position agrees long before the body is in equilibrium.
 

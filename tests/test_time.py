@@ -197,6 +197,7 @@ def test_many_branches():
         assert pull(path, state=state) == pytest.approx(material.relaxation("uniaxial", 1.5, t), rel=1e-2)
 
 
+@pytest.mark.thorough
 def test_layers_of_different_branches():
     """Pulled at the rim all layers have one stretch, and add their forces; one of them does not relax."""
     layers = {"a": (P0, 0.5), "b": (P1, 0.3), "c": (fx.NeoHookean(c10=0.2), 0.2)}

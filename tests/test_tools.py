@@ -69,7 +69,8 @@ def distance_to(points, line):
     return best
 
 
-@pytest.mark.parametrize("name", SHAPES)
+@pytest.mark.parametrize("name", [
+    pytest.param(name, marks=[pytest.mark.thorough] * (name == "long")) for name in SHAPES])
 def test_distance_against_brute_force(name):
     tool = SHAPES[name]
     low, high = tool.outline().min(0) - 0.4 * tool.size, tool.outline().max(0) + 0.4 * tool.size

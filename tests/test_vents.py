@@ -20,6 +20,7 @@ def formed(vent, material=RELAXES, **contact):
     return scene, [fx.Stage("form", control="vacuum", until=fx.pressure(1.5)), fx.Stage("hold", duration=5.0), vent]
 
 
+@pytest.mark.thorough
 def test_a_vented_sheet_recovers_as_without_its_mould(caplog):
     """It separates point by point, in 73 states instead of 9, from which the check before the run warns."""
     ends, counts = [], []

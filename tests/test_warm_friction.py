@@ -101,6 +101,7 @@ def test_wrong_friction_tables_are_refused(friction, temperature, words):
         pushed(friction, temperature, travel=0.01)
 
 
+@pytest.mark.thorough
 def test_a_melt_that_is_chilled_below_the_pole_of_its_shift_does_not_relax(caplog):
     """The WLF shift of docs/my_polymer.md is infinite at 90 C: below 103.7 C, where it is 1e30, it stays so."""
     shift = fx.WLF(8.9, 60.0, 150.0)

@@ -35,6 +35,7 @@ def whole():
     return done.stdout.splitlines()
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("names", [tuple(MISSING), *(pytest.param((name,), marks=pytest.mark.slow)
                                                      for name in MISSING)])
 def test_the_core_without_extensions(names, whole, tmp_path):
