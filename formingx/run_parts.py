@@ -157,7 +157,7 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
         raise InputError(f"{caller}: resume=True: give a checkpoint to continue from, and no start")
     if not holds_states(checkpoint, scene.mesh.comm):
         return None
-    path = Path(read(checkpoint, scene))
+    path = Path(read(checkpoint, scene, resumes=True))
     if plans:
         check_stages(file_path("checkpoint", checkpoint), plans, path.last.setting["stage"], path.last.time,
                      scene.mesh.comm)

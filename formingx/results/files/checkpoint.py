@@ -49,7 +49,7 @@ from .checkpoint_data import (
     read_states,
     state_name,
 )
-from .description import describe
+from .description import describe, incomparable
 from .progress import progress
 
 
@@ -189,13 +189,14 @@ class Checkpoint:
         files.on_root(problem.comm, act)
 
 
-def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
+def read(folder: Any, scene: Scene, state: int | None = None, resumes: bool = False) -> Record:
     """Return the solver's record of the run in a checkpoint (`formingx.load`); collective.
 
     Args:
         folder: folder of the checkpoint.
         scene: the scene of the run.
         state: number of the last state to read, from 0; default the last state of the last completed step.
+        resumes: True to refuse a scene with an object that cannot be compared with that of the checkpoint.
 
     Returns:
         The record with all states up to that one. Its problem has the unknowns of the last state.
@@ -206,6 +207,10 @@ def read(folder: Any, scene: Scene, state: int | None = None) -> Record:
     folder = file_path("load: folder", folder)
     problem = Problem(check_type("load: scene", scene, Scene, "a formingx.Scene"))
     about = describe(problem)
+    if resumes and (unknown := next(incomparable(about), None)):
+        raise InputError(f"checkpoint {str(folder)!r}: {unknown[0]} of the scene, {unknown[1]}, cannot be compared with"
+                         f" the one of the checkpoint: if they are equal, go on with"
+                         f" start=fx.load({str(folder)!r}, scene)")
 
     def look():
         check_scene(folder, read_json(folder / "scene.json"), about)

@@ -1,5 +1,6 @@
 """Reading of the files of a checkpoint folder without a scene; the module `checkpoint` describes the files."""
 
+import itertools
 import json
 import time
 import zlib
@@ -17,7 +18,7 @@ from .arrays import unpack
 from .description import differences
 from .progress import progress
 
-FORMAT = 11  # number of the format of the files, in scene.json
+FORMAT = 12  # number of the format of the files, in scene.json
 FIELDS = ("x", "direction")
 HISTORIES = ("history_variables", "history_variables_before")
 ARRAYS = "arrays.bin"
@@ -159,9 +160,25 @@ def check_scene(folder: FilePath, about: dict, scene: dict) -> None:
         raise InputError(f"checkpoint {str(folder)!r} is damaged: scene.json has no description of the scene")
     found = list(differences(about["scene"], json.loads(json.dumps(scene))))
     if found:
-        shown = "; ".join(f"{where}: {a!r} there, {b!r} here" for where, a, b in found[:4])
+        shown = "; ".join(itertools.starmap(_difference, found[:4]))
         further = f"; and {len(found) - 4} more" if len(found) > 4 else ""
         raise InputError(f"checkpoint {str(folder)!r} is of another scene: {shown}{further}")
+
+
+def _difference(where: str, there: Any, here: Any) -> str:
+    """Return a difference between two descriptions of a scene as text."""
+    function, _, entry = where.rpartition(".")
+    if entry == "code" and isinstance(there, str) and isinstance(here, str):
+        return f"{function}: the code of the function differs"
+    if isinstance(there, dict | list) or isinstance(here, dict | list):
+        return f"{where}: {brief(there)} there, {brief(here)} here"
+    return f"{where}: {there!r} there, {here!r} here"
+
+
+def brief(value: Any) -> str:
+    """Return JSON data as text of at most 80 characters."""
+    text = repr(value)
+    return text if len(text) <= 80 else f"{text[:77]}..."
 
 
 def state_name(number: int) -> str:

@@ -14,6 +14,7 @@ from ...errors import InputError
 from .. import files
 from .checkpoint_data import named_os_errors, read_json
 from .description import differences
+from .functions import described
 
 STAGES = "stages.json"
 _MAY_CHANGE = ("until", "intermediate", "duration", "tables")
@@ -59,11 +60,13 @@ def check_stages(folder: FilePath, plans: Sequence[Any], number: int, now: float
         comm: MPI communicator.
 
     Raises:
-        InputError: a stage differs; the message names the first difference.
+        InputError: a stage differs, and the message names the first difference; or the stages are not known.
     """
     def check():
         if not (folder / STAGES).exists():
-            return
+            raise InputError(f"checkpoint {str(folder)!r} has no {STAGES}, by which its stages are compared: it is not"
+                             f" of a process with checkpoint=..., or the file was removed; go on from it with"
+                             f" start=fx.load({str(folder)!r}, scene), or remove the folder")
         stored, here = read_json(folder / STAGES)["stages"], describe_stages(plans)
         if number >= len(here):
             found = (f"its last state is of stage {number + 1}, {stored[number]['name']!r}, but the process has"
@@ -104,6 +107,7 @@ def _describe(plan: Any) -> dict[str, Any]:
             "intermediate": [target(t) for t in stage.intermediate], "at_limit_point": stage.at_limit_point,
             "tables": [[i, table.tolist()] for i, table in plan.tables],
             "measure": quantity and quantity(0.0).name,
+            "function_of_time": described(amplitude) if callable(amplitude) else None,
             "table_of_measure": amplitude.tolist() if isinstance(amplitude, np.ndarray) else None}
 
 

@@ -11,6 +11,9 @@ from ...materials.constants import Varying
 from ...materials.material import Material
 from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
 from ...scene.summary import text
+from ...values.table import Table
+from ...values.temperature import FunctionOfTemperature
+from .functions import UNKNOWN, class_code, described, field_sums, functions_in
 
 _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "quadrature_degree")
 
@@ -31,7 +34,7 @@ def describe(problem: Any) -> dict[str, Any]:
     found = {"mesh": _mesh(problem), "unknowns": problem.n_unknowns,
              **{name: plain(getattr(scene, name)) for name in (*_PARTS, *extra)}}
     if scene.temperature is not None:
-        found["temperature"] = text(scene.temperature)
+        found["temperature"] = {"kind": text(scene.temperature), "sums": field_sums(scene.temperature.T)}
     for layer, material in scene.materials.items():
         if material.varies:
             constants = {name: constant.values for name, constant in material.constants().items()
@@ -47,8 +50,9 @@ def describe(problem: Any) -> dict[str, Any]:
 def plain(value: Any, depth: int = 8) -> Any:
     """Return an object as JSON data: numbers, strings, lists and dictionaries.
 
-    An object becomes {"kind": name of its class, name of a public attribute: its value}. Functions and objects that are
-    nested too deeply become text.
+    An object becomes {"kind": name of its class, name of a public attribute: its value}, with the code of a class of
+    the user. A function is described by what it computes (`functions.described`). Objects that are nested too deeply
+    become text.
 
     Args:
         value: any object.
@@ -63,11 +67,34 @@ def plain(value: Any, depth: int = 8) -> Any:
     if isinstance(value, list | tuple):
         return [plain(v, depth - 1) for v in value]
     if isinstance(value, Material):
-        return {"kind": text(value)} | ({} if value.varies else {"shear_modulus": value.shear_modulus})
-    if callable(value) or depth == 0 or not hasattr(value, "__dict__"):
-        return getattr(value, "__qualname__", text(value))
-    return {"kind": type(value).__name__,
-            **{k: plain(v, depth - 1) for k, v in vars(value).items() if not k.startswith("_")}}
+        return {"kind": text(value)} | ({} if value.varies else {"shear_modulus": value.shear_modulus}) | (
+            {"functions": found} if (found := dict(functions_in(value))) else {})
+    if isinstance(value, FunctionOfTemperature):
+        return {"kind": text(value), "function": described(value.function)}
+    if callable(value) or isinstance(value, Table):
+        return described(value)
+    if depth == 0 or not hasattr(value, "__dict__"):
+        return text(value)
+    code = class_code(type(value))
+    return {"kind": type(value).__name__, **code,
+            **{k: plain(v, depth - 1) for k, v in vars(value).items() if code or not k.startswith("_")}}
+
+
+def incomparable(about: Any, where: str = "") -> Iterator[tuple[str, str]]:
+    """Yield the objects in a description that cannot be compared, as (place, text of the object).
+
+    Args:
+        about: JSON data (`describe`).
+        where: place of the data in the whole description.
+    """
+    if isinstance(about, dict):
+        if UNKNOWN in about:
+            yield where, about[UNKNOWN]
+        for key, value in about.items():
+            yield from incomparable(value, f"{where}.{key}" if where else str(key))
+    elif isinstance(about, list):
+        for k, value in enumerate(about):
+            yield from incomparable(value, f"{where}[{k}]")
 
 
 def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
