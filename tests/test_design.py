@@ -218,6 +218,19 @@ def test_stages_friction_and_time(relaxing):
         assert np.linalg.norm(by[:, k] - whole) < (0.02 if relaxing else 2e-3) * np.linalg.norm(whole), name
 
 
+def test_dissipated_energy_has_no_derivative_and_is_kept():
+    """It depends on all states; a derivative of the wall leaves the run and its energy balance as they are."""
+    design = fx.Design(lambda mu, travel: pot(mu, travel, relaxing=True), {"mu": (0.2, 0, 1), "travel": (0.3, 0.1, 1)})
+    run = design.run()
+    before, balance = run.path["dissipated_energy"], run.path.work()["unbalanced"]
+    run.derivative(lambda path: path.part().min_wall)
+    assert before[-1] > 0 and np.array_equal(run.path["dissipated_energy"], before)
+    assert np.array_equal(run.path.work()["unbalanced"], balance)
+    for wrong in (run.derivative, lambda name: run.spread({"mu": 0.1}, name)):
+        with pytest.raises(fx.InputError, match="this column 'dissipated_energy' looks at earlier states"):
+            wrong("dissipated_energy")
+
+
 def pressed(c10, nose, travel, force=None):
     """Return a sheet that a ball without friction is pushed into, to a travel or to a force."""
     mesh = fx.mesh.disc(radius=40.0, thickness=1.2, elements=(10, 1))

@@ -90,7 +90,8 @@ CHANGES = {
                             lambda: scene(contact=type("Law", (fx.Contact,), {"shear_limit": lambda s, p, m: (m * p, m),
                                                                               "__module__": __name__}), friction=0.3),
                             "shear_limit"),
-    "temperature": (lambda: scene(temperature=lambda R, Z: 100.0 + R), lambda: scene(temperature=lambda R, Z: 120.0 - R),
+    "temperature": (lambda: scene(temperature=lambda R, Z: 100.0 + R),
+                    lambda: scene(temperature=lambda R, Z: 120.0 - R),
                     "temperature.sums"),
 }
 

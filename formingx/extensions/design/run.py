@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path as FilePath
 from typing import Any
@@ -288,7 +288,10 @@ class DesignRun:
         if isinstance(measure, str):
             if measure in ("wall", "volume"):
                 return np.atleast_1d(getattr(self, measure))
-            return self.path[measure][-1:]
+            values = self.path[measure][-1:]
+            if measure in self._last_alone.columns:
+                self._check_last_alone(values, self._last_alone[measure], f"column {measure!r}")
+            return values
         found = measure(self.path) if callable(measure) else None
         try:
             values = np.atleast_1d(np.asarray(found, dtype=float))
@@ -297,11 +300,30 @@ class DesignRun:
         if not np.all(np.isfinite(values)):
             raise InputError(f"Design: measure {measure!r} is {found!r}: must be 'wall', 'volume', a column of the"
                              f" path, or a function of it that gives finite numbers")
-        short = _path_of(self.path.last, Record(self.path.problem, self.path.record.curve))
-        if not np.allclose(values, measure(short), rtol=1e-9, atol=0):
-            raise InputError("Design: a measure must be one of the last state alone: this function of the path looks at"
-                             " earlier states too, whose derivatives are not kept")
+        self._check_last_alone(values, measure(self._last_alone), "function of the path")
         return values
+
+    @cached_property
+    def _last_alone(self) -> Path:
+        """Path that contains only the last state of this run."""
+        return _path_of(self.path.last, Record(self.path.problem, self.path.record.curve))
+
+    @staticmethod
+    def _check_last_alone(values: np.ndarray, alone: Any, what: str) -> None:
+        """Check that a quantity does not depend on earlier states.
+
+        Args:
+            values: the quantity in the last state of the run, shape (m,).
+            alone: the same of the last state alone.
+            what: "function of the path" or the column, for the message.
+
+        Raises:
+            InputError: both differ.
+        """
+        if not np.allclose(values, alone, rtol=1e-9, atol=0):
+            raise InputError(f"Design: a measure must be one of the last state alone: this {what} looks at"
+                             " earlier states too, whose derivatives are not kept; compare whole runs at two values of"
+                             " the parameter")
 
     def _perturbed_value(self, perturbed: PerturbedRun, measure: Any) -> Any:
         """Return the values of an output quantity in a perturbed run, shape (m,) or a number.
@@ -329,13 +351,13 @@ def _volume(problem: Any) -> float:
 
 
 def _path_of(state: Any, record: Record) -> Path:
-    """Return a path that contains one state.
+    """Return a path that contains a copy of one state, with its own measures.
 
     Args:
         state: the state.
         record: an empty record of a run.
     """
-    path = Path(record)
+    path, state = Path(record), replace(state)
     record.segments[-1].states.append(state)
     for listener in record.hooks.on_state:
         listener(state)

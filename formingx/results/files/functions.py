@@ -28,9 +28,9 @@ UNKNOWN = "cannot be compared"
 _LARGEST = 64
 """Number of entries above which an array is described by sums."""
 
-_LIBRARIES = tuple({os.path.dirname(os.path.abspath(place.__file__)) + os.sep for place in (os, np)}
-                   | {os.path.dirname(os.path.dirname(os.path.abspath(np.__file__))) + os.sep,
-                      os.path.abspath(os.path.join(os.path.dirname(__file__), "..", "..")) + os.sep})
+_LIBRARIES = tuple(os.path.abspath(folder) + os.sep for folder in (
+    os.path.dirname(os.__file__), os.path.join(os.path.dirname(str(np.__file__)), ".."),
+    os.path.join(os.path.dirname(__file__), "..", "..")))
 """Folders of installed packages, of the standard library and of formingx."""
 
 
@@ -153,7 +153,7 @@ def _installed(value: Any) -> bool:
         return True
     code = getattr(value, "__code__", None)
     file = code.co_filename if code is not None else getattr(sys.modules.get(name), "__file__", None)
-    return bool(file) and os.path.abspath(file).startswith(_LIBRARIES)
+    return file is not None and os.path.abspath(file).startswith(_LIBRARIES)
 
 
 def _array(value: np.ndarray, depth: int, known: tuple[int, ...]) -> Any:
