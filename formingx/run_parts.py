@@ -12,7 +12,9 @@ from .errors import ConvergenceError, InputError, Interrupted, check_name, check
 from .findings import Finding, log_findings
 from .measures.columns import Measure
 from .problem.problem import Problem
+from .results import files
 from .results.files.checkpoint import Checkpoint, holds_states, read
+from .results.files.checkpoint_data import PILOT, ended
 from .results.files.checkpoint_stages import check_stages, write_stages
 from .results.path import Path
 from .run_hooks import adaptation
@@ -26,17 +28,19 @@ log = logging.getLogger("formingx")
 
 
 def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
-                        run: Callable[[Scene, Any], Path]) -> Path:
+                        run: Callable[[Scene, Any, bool], Path]) -> Path:
     """Return the path of a run on a mesh that is adapted to a first run.
+
+    With a checkpoint, the states of the first run are stored in its folder "pilot".
 
     Args:
         caller: name of the calling function, `trace` or `Process`, for messages.
         adapt_mesh: argument of the calling function: True, or {argument of `mesh.adapted`: value}.
         start: argument of the calling function; must be None.
-        resume: argument of the calling function; must be False.
+        resume: argument of the calling function, True or False.
         scene: the scene on the first mesh.
         checkpoint: folder of the checkpoint of the second run, or None.
-        run: function of a scene and a checkpoint that returns the path of a run.
+        run: function of a scene, a checkpoint and `resume` that returns the path of a run.
 
     Returns:
         Path of the second run; `Path.pilot` is the path of the first.
@@ -45,9 +49,9 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
         InputError: an argument is not allowed.
         ConvergenceError: the second run failed, or the first run failed with fewer than three states.
     """
-    if start is not None or resume:
+    if start is not None:
         raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins with the unloaded body and makes"
-                         f" the mesh; with start or resume a run continues on its own mesh: give only one of them")
+                         f" the mesh; with start a run continues on its own mesh: give only one of them")
     if adapt_mesh is not True and not isinstance(adapt_mesh, Mapping):
         raise InputError(f"{caller}: adapt_mesh = {adapt_mesh!r}: must be True, False or arguments of mesh.adapted,"
                          f" such as {{'error': 0.02}}")
@@ -56,20 +60,37 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
     for name in options:
         check_name(f"{caller}: adapt_mesh", name, ("max_rotation", "error"))
     meshes.check(scene.mesh)
+    folder = None if checkpoint is None else file_path("checkpoint", checkpoint) / PILOT
+    first = _stored_pilot(folder, scene) if resume else None
     try:
-        first = run(scene, None)
+        first = first or run(scene, folder, resume)
     except ConvergenceError as error:
         if error.path is None or len(error.path) < 3:
             raise
         first = error.path
         log.warning("the pilot run ended early, at %s; the mesh is adapted to its states",
                     first.describe(first.last))
-    adapted = meshes.make(first, options)
+    # a resumed run reads the stored states, so its mesh is made from them, too
+    adapted = meshes.make(first if folder is None else _stored_pilot(folder, scene) or first, options)
     log.info("pilot run: %d states on %d elements; adapted: %d", len(first), *(
         mesh.domain.topology.index_map(2).size_global for mesh in (scene.mesh, adapted)))
-    path = run(scene.with_mesh(adapted), checkpoint)
+    path = run(scene.with_mesh(adapted), checkpoint, resume)
     path.pilot = first
     return path
+
+
+def _stored_pilot(folder: Any, scene: Scene) -> Path | None:
+    """Return the path of a pilot run that has ended from its checkpoint; None without one; collective.
+
+    Args:
+        folder: folder of the checkpoint, or None.
+        scene: the scene on the first mesh.
+    """
+    comm = scene.mesh.comm
+    if folder is None or not holds_states(folder, comm) or not files.on_root(comm, lambda: ended(folder) is not None):
+        return None
+    path = Path(read(folder, scene, resumes=True))
+    return path if len(path) > 2 else None
 
 
 def check_start(state: State, stages: list[Stage], problem: Problem) -> None:

@@ -68,7 +68,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
             tool, with inverted elements. `State.inadmissible_reason` gives the reason. By default the run ends there.
         adapt_mesh: True to run twice: on the mesh of the scene, which may be coarse, and on `mesh.adapted(path)`. Or
             arguments of `adapted`, such as {"error": 0.02}. `Path.pilot` is the path of the first run, which may have
-            ended before the target.
+            ended before the target. A checkpoint stores it in its folder "pilot".
         remesh: a `Remesh`, which replaces crushed elements by a new mesh of the deformed body. A state of kind "remesh"
             stores the relative change of force, energy and volume in `jump`. For solids of one layer, on one rank.
         stop_at: `instability(modes=range(2, 9))` ends the run when the body becomes unstable in one of these modes.
@@ -95,10 +95,10 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
         if adapt_mesh is not False or stop_at is not None:
             raise InputError("trace: remesh: cannot be combined with adapt_mesh or stop_at")
     if adapt_mesh is not False:
-        def run(scene: Scene, checkpoint: Any) -> Path:
+        def run(scene: Scene, checkpoint: Any, resume: bool) -> Path:
             """Return the path of a run on the mesh of `scene`."""
             return trace(scene, until=until, intermediate=intermediate, step=step, tolerances=tolerances,
-                         max_steps=max_steps, progress=progress, checkpoint=checkpoint, record=record,
+                         max_steps=max_steps, progress=progress, checkpoint=checkpoint, record=record, resume=resume,
                          at_limit_point=at_limit_point, allow_inadmissible=allow_inadmissible, stop_at=stop_at)
         return run_on_adapted_mesh("trace", adapt_mesh, start, resume, scene, checkpoint, run)
     intermediate = as_list("trace: intermediate", intermediate, "targets, such as pole_stretch(3)")
@@ -254,11 +254,11 @@ class Process:
             if adapt_mesh is not False:
                 raise InputError("Process: remesh: cannot be combined with adapt_mesh")
         if adapt_mesh is not False:
-            def run(scene: Scene, checkpoint: Any) -> Path:
+            def run(scene: Scene, checkpoint: Any, resume: bool) -> Path:
                 """Return the path of a run on the mesh of `scene`."""
                 return Process(scene).run(stages, step=step, tolerances=tolerances, max_steps=max_steps,
                                           progress=progress, checkpoint=checkpoint, record=record, accuracy=accuracy,
-                                          allow_inadmissible=allow_inadmissible)
+                                          resume=resume, allow_inadmissible=allow_inadmissible)
             return run_on_adapted_mesh("Process", adapt_mesh, start, resume, self.scene, checkpoint, run)
         check_type("Process: step", step, StepControl | None, "a StepControl or None")
         check_type("Process: tolerances", tolerances, Tolerances | None, "a Tolerances or None")

@@ -1,5 +1,7 @@
 """Meshes adapted to a first run (`mesh.adapted`, `trace(adapt_mesh=)`)."""
 
+import shutil
+
 import numpy as np
 import pytest
 
@@ -17,6 +19,37 @@ def plugged(mesh, **options):
 
 def disc(elements, **options):
     return fx.mesh.disc(radius=10.0, thickness=0.5, elements=elements, **options)
+
+
+def inflated(elements, **options):
+    scene = fx.Scene(mesh=disc(elements), materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    return fx.trace(scene, until=fx.pole_height(6.0), progress=False, **options)
+
+
+def cut(folder, number):
+    """Leave the states before `number` in a checkpoint, as if the run had been killed."""
+    for state in [entry for entry in folder.iterdir() if entry.name.isdigit() and int(entry.name) >= number]:
+        shutil.rmtree(state)
+    (folder / "end.json").unlink(missing_ok=True)
+
+
+@pytest.mark.parametrize("pilot", (False, True))
+def test_a_killed_run_on_an_adapted_mesh_is_resumed(pilot, tmp_path):
+    """Killed in the pilot run or in the second run: it has the states of a run that was not killed."""
+    options = {"adapt_mesh": {"max_rotation": None, "error": 0.01}, "checkpoint": tmp_path / "run"}
+    whole = inflated((6, 1), **options)
+    pressures = whole["pressure"].copy(), whole.pilot["pressure"].copy()
+    assert len(pressures[0]) > 4 and len(pressures[1]) > 4
+    if pilot:
+        cut(tmp_path / "run" / "pilot", 3)
+        cut(tmp_path / "run", 0)
+        (tmp_path / "run" / "scene.json").unlink()
+    else:
+        cut(tmp_path / "run", 3)
+    again = inflated((6, 1), **options, resume=True)
+    assert again["pressure"] == pytest.approx(pressures[0], rel=1e-9)
+    assert again.pilot["pressure"] == pytest.approx(pressures[1], rel=1e-9)
 
 
 def test_columns_of_a_pilot_run_resolve_the_plug_edge():
@@ -99,7 +132,7 @@ def test_wrong_arguments_of_adapted_are_refused():
     with pytest.raises(fx.InputError, match="adapt_mesh = 3"):
         plugged(mesh, adapt_mesh=3)
     with pytest.raises(fx.InputError, match="adapt_mesh=True: a pilot run begins with the unloaded body"):
-        plugged(mesh, adapt_mesh=True, resume=True, checkpoint="nowhere")
+        plugged(mesh, adapt_mesh=True, start=inflated((4, 1)))
     mesh.domain.geometry.x[:, 1] *= 0.99
     with pytest.raises(fx.InputError, match="were moved"):
         plugged(mesh, adapt_mesh=True)

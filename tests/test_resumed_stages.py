@@ -70,3 +70,26 @@ def test_status_knows_that_a_target_without_a_column_is_met(tmp_path, capsys):
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")])
     fx.trace(sheet, until=until, checkpoint=tmp_path / "run", progress=False)
     assert main(["status", str(tmp_path / "run")]) == 0 and "the target is met" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("lift", (0.7, 1.4))
+def test_a_run_continues_after_the_release_of_a_tool_that_is_free(lift, tmp_path):
+    """The stage that releases it has one state, in equilibrium: nothing fades, and the same states follow."""
+    def pushed():
+        mesh = fx.mesh.disc(radius=20.0, thickness=0.5, elements=(6, 1))
+        return fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.3),
+                        supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                        loads=[fx.Pressure("bottom", name="air")],
+                        contacts=[fx.Contact("top", fx.tools.sphere(radius=9.0, z=2.5), "none", direction=(0, -1),
+                                             name="ball")])
+    down_up = [fx.Stage("down", control="ball", until=fx.travel(5.0)),
+               fx.Stage("up", control="ball", until=fx.travel(lift)), fx.Stage("off", inactive=["ball"])]
+    blow = fx.Stage("blow", control="air", until=fx.pressure(0.004), inactive=["ball"])
+    whole = fx.Process(pushed()).run([*down_up, blow], progress=False)
+    fx.Process(pushed()).run(down_up, progress=False, checkpoint=tmp_path / "run")
+    released = pushed()
+    path = fx.load(tmp_path / "run", released)
+    assert [s.stage for s in path.states].count("off") == 1 and not path.last.setting["fading"]
+    for again in (fx.Process(released).run([*down_up, blow], progress=False, start=path),
+                  fx.Process(pushed()).run([*down_up, blow], progress=False, checkpoint=tmp_path / "run", resume=True)):
+        assert again["pole_height"] == pytest.approx(whole["pole_height"], rel=1e-9)

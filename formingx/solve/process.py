@@ -215,9 +215,13 @@ class Execution:
             still, fading = [0.0] * len(before.base), bool(self.record.states) and before.inactive != self._inactive
             start = 0.0 if fading else control
             self._enter(self._amplitudes(), still, 0, start, fading)
-        if self.problem.setting.fading and (begun or self._out_of_balance(x)):
+        if not self.problem.setting.fading:
+            return
+        if begun or self._out_of_balance(x):
             target = change_completed()
             self._trace([(target, target.bind(self.problem))], start)
+        else:                                               # such as a tool that is free already: nothing fades
+            self._enter(self._amplitudes(), still, 0, control)
 
     def _out_of_balance(self, x: Array) -> bool:
         """Return True if the unbalanced forces at the unknowns x are not negligible against the support forces.

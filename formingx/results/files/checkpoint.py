@@ -3,6 +3,7 @@
     run/scene.json        description of the scene, and versions of programs.
     run/0000/state.json   numbers of state 0, and checksums.
     run/0000/arrays.bin   arrays of state 0 (`arrays.pack`): unknowns, tangent of the path, history variables.
+    run/pilot/            checkpoint of the first run with `adapt_mesh=`, to which the mesh was adapted.
     run/end.json          error message and findings at the end of the run; missing while it runs, or if it was killed.
 
 A state is written under a temporary name and then renamed. So a state with its final name is complete, even if the run
@@ -40,6 +41,7 @@ from .checkpoint_data import (
     FIELDS,
     FORMAT,
     HISTORIES,
+    PILOT,
     check_scene,
     complete_states,
     crc_sums,
@@ -118,7 +120,7 @@ class Checkpoint:
 
         def begin():
             if not (folder / "scene.json").exists():
-                if folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
+                if folder.exists() and (not folder.is_dir() or {entry.name for entry in folder.iterdir()} - {PILOT}):
                     raise InputError(f"checkpoint {str(folder)!r} exists already and is not a checkpoint")
                 folder.mkdir(parents=True, exist_ok=True)
                 files.replace(folder / "scene.json", lambda stream: json.dump(about, stream, indent=1))

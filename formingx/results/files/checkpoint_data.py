@@ -23,6 +23,8 @@ FIELDS = ("x", "direction")
 HISTORIES = ("history_variables", "history_variables_before")
 ARRAYS = "arrays.bin"
 END = "end.json"
+PILOT = "pilot"
+"""Folder in a checkpoint with the checkpoint of the run to which its mesh was adapted."""
 
 
 def begun(folder: Any) -> bool:
