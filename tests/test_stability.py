@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 from conftest import run_json, treloar
+from dolfinx import fem
 
 import formingx as fx
 import formingx.exact.stability as exact
@@ -76,6 +77,26 @@ def test_rigid_motions_have_no_energy(material):
             del variation._constrain_rigid
 
 
+@pytest.mark.parametrize("component", [0, 2], ids=["radial", "hoop"])
+def test_spin_lowers_the_energy_of_a_mode(component):
+    """By rho w^2/2 times the integral of the squared motion across the axis, in the radial and the hoop direction."""
+    variation = {spin: SecondVariation(Problem(ring(fx.NeoHookean(c10=1.0), loads=[fx.CentrifugalLoad(3.0, spin)])))
+                 for spin in (0.0, 0.7)}
+    quadratic = []
+    for found in variation.values():
+        forms = found.problem.forms
+        x = np.zeros(found.matrix.getLocalSize()[0])
+        sub, dofs = found.space.sub(0).sub(component).collapse()
+        mode = fem.Function(sub)
+        mode.interpolate(lambda X: (2 - X[0]) * (0.3 + X[1]))
+        x[np.asarray(dofs)] = mode.x.array / forms.length
+        quadratic.append(x @ (sparse(found.fill(2)) @ x) * forms.stress * forms.volume)
+    g, w = np.polynomial.legendre.leggauss(6)
+    R, Z = np.meshgrid(1.25 + 0.75 * g, 0.4 + 0.4 * g, indexing="ij")
+    squared = 2 * np.pi * R * np.outer(0.75 * w, 0.4 * w) * ((2 - R) * (0.3 + Z)) ** 2
+    assert quadratic[1] - quadratic[0] == pytest.approx(-3.0 * 0.7 * squared.sum(), rel=1e-9)
+
+
 @pytest.mark.parametrize("ogden, same", [
     (fx.Ogden(mu=2.0, alpha=2.0), fx.NeoHookean(c10=1.0)),
     (fx.Ogden(mu=(2.0, -0.6), alpha=(2.0, -2.0)), fx.MooneyRivlin(c10=1.0, c01=0.3))], ids=["neo-Hooke", "Mooney"])
@@ -108,7 +129,6 @@ def test_second_variation_equals_differences_of_the_energy_in_three_dimensions(n
         return (2 - R) * (0.3 + Z), (2 - R) * (0.5 - 0.4 * Z + 0.2 * R), (2 - R) * (0.7 * Z - 0.1)
     for i in range(2):
         sub, dofs = problem.forms.space.sub(0).sub(i).collapse()
-        from dolfinx import fem
         f = fem.Function(sub)
         f.interpolate(lambda X, i=i: base(X[0], X[1])[i] / L)
         problem.forms.w.x.array[np.asarray(dofs)] = f.x.array

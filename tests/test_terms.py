@@ -104,6 +104,21 @@ def test_a_spinning_tube():
     np.testing.assert_allclose(u, speed2 * a**2 * b**2 / (4 * 2 * c10) / R, rtol=2e-4)
 
 
+def test_a_tube_that_spins_at_large_strain():
+    """Incompressible, r^2 = R^2 + c: the integral of (sigma_hoop - sigma_r)/r over r is rho w^2 (b^2 - a^2)/2."""
+    a, b, c, c10 = 1.0, 2.0, 1.5, 0.5
+    r, weights = np.polynomial.legendre.leggauss(30)
+    inner, outer = np.sqrt(a**2 + c), np.sqrt(b**2 + c)
+    r, weights = (inner + outer) / 2 + (outer - inner) / 2 * r, (outer - inner) / 2 * weights
+    square = r**2 / (r**2 - c)                                         # of the hoop stretch
+    speed2 = 2 * c10 * weights @ ((square - 1 / square) / r) / ((b**2 - a**2) / 2)
+    scene = fx.Scene(mesh=disc((8, 1), inner_radius=a), materials=fx.NeoHookean(c10=c10),
+                     supports=[fx.Symmetry(face, normal="z") for face in ("bottom", "top")],
+                     loads=[fx.CentrifugalLoad(1.0)])
+    u = displacement(fx.solve(scene, to=speed2, increments=8), [(a, 0.0), (b, 0.0)])[:, 0]
+    np.testing.assert_allclose(u, [inner - a, outer - b], rtol=1e-3)
+
+
 @pytest.mark.parametrize("model", [fx.MixedPressure(), fx.Membrane()], ids=lambda m: type(m).__name__)
 @pytest.mark.parametrize("value", [None, 9.81], ids=["driven", "fixed"])
 def test_a_rigid_translation_does_the_work_of_the_weight(model, value):
