@@ -15,5 +15,7 @@ def edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray,
         of the 3 m edges, shape (3 m,). Last the number of triangles at each distinct edge, shape (k,).
     """
     directed = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
-    edges, numbers, times = np.unique(np.sort(directed, axis=1), axis=0, return_inverse=True, return_counts=True)
-    return directed, edges, numbers.ravel(), times
+    low, high = np.sort(directed, axis=1).T.astype(np.int64)
+    base = int(directed.max(initial=0)) + 1
+    keys, numbers, times = np.unique(low * base + high, return_inverse=True, return_counts=True)
+    return directed, np.column_stack(np.divmod(keys, base)), numbers.ravel(), times

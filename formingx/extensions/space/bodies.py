@@ -23,16 +23,17 @@ def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> l
         caller: name of the caller, for messages.
 
     Returns:
-        For each group the vertex numbers of its triangles, shape (k, 3). A cavity belongs to the body around it.
+        For each group the row numbers of its triangles, shape (k,). A cavity belongs to the body around it.
 
     Raises:
         InputError: the triangles of a body look inward, and the body is not a cavity of another body.
     """
-    bodies = [triangles[part] for part in _parts(points, triangles)]
+    parts = _parts(points, triangles)
+    bodies = [triangles[part] for part in parts]
     boxes = np.array([[points[body].min((0, 1)), points[body].max((0, 1))] for body in bodies])
     volumes = np.array([volume(points, body) for body in bodies])
     full = [k for k in np.argsort(-volumes) if volumes[k] > 0]
-    whole = {k: [bodies[k]] for k in full}
+    whole = {k: [parts[k]] for k in full}
     for k in np.flatnonzero(volumes <= 0):
         around = [i for i in full if (boxes[i, 0] <= boxes[k, 0]).all() and (boxes[k, 1] <= boxes[i, 1]).all()]
         if not around:
@@ -40,7 +41,7 @@ def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> l
             raise InputError(f"{caller} has a body around {place} that is inside out: its triangles look inward: turn"
                              f" them in"
                              f" the program that wrote the file")
-        whole[around[-1]].append(bodies[k])                        # the smallest
+        whole[around[-1]].append(parts[k])                        # the smallest
     groups: list[list[int]] = []
     for k in full:
         free = [group for group in groups if not any(_overlap(boxes[k], boxes[i]) for i in group)]
@@ -48,7 +49,7 @@ def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> l
             free[0].append(k)
         else:
             groups.append([k])
-    return [np.concatenate([part for k in group for part in whole[k]]) for group in groups]
+    return [np.sort(np.concatenate([part for k in group for part in whole[k]])) for group in groups]
 
 
 def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

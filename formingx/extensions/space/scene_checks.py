@@ -12,7 +12,6 @@ from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode, Symmetry
 from ...ranks import gathered
 from .sheet import Sheet
-from .solid_tool import Swept
 
 _EXTENT_RATIO = 9.0
 """Ratio of the largest extents of tool and sheet, either way, from which their units of length probably differ.
@@ -152,9 +151,6 @@ def check_contact(scene: Any, contact: Any) -> None:
     if not contact.sticks and not contact.separates:
         raise InputError(f"{contact!r}: separates = False: a sheet in three dimensions that slides separates where it"
                          f" is in tension: must be 'stick', or without separates=False")
-    if not contact.sticks and not isinstance(tool, Swept):
-        raise InputError(f"{contact!r}: sliding over a tool of flat triangles is not available, as their edges stop a"
-                         f" sheet: must be 'stick', or a tool made by box, revolved or extruded")
     relaxes = any(material.internal or material.integral for material in scene.materials.values())
     if contact.sticks and contact.separates and relaxes:
         raise InputError(f"{contact!r}: separates = True: a sheet in three dimensions that relaxes sticks where it"

@@ -26,7 +26,7 @@ _CORNER_PIECES = 24           # straight pieces of a rounded corner in `surface`
 class SolidTool:
     """Rigid tool in three dimensions, the base class of swept profiles and of surfaces from STL files.
 
-    A subclass defines `_distance` and `_surface`.
+    A subclass defines `_distance`, `_distances` and `_surface`.
 
     Attributes:
         components: number of coordinates, 3.
@@ -48,6 +48,21 @@ class SolidTool:
             Signed distances, shape (n,), length.
         """
         return self._distance(as_points("signed_distance: x", x, 3) - self.shift)
+
+    def distances(self, x: np.ndarray) -> Distances:
+        """Return the signed distances of points from the tool, with first and second derivatives.
+
+        Args:
+            x: positions, shape (n, 3), length.
+
+        Returns:
+            Distances (positive inside the tool), normals (into the tool) and Hessians at the n points.
+
+        >>> found = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=-10.0)).distances([[0.0, 0.0, -8.0]])
+        >>> found.distance.tolist(), found.normal.tolist()
+        ([2.0], [[0.0, 0.0, 1.0]])
+        """
+        return self._distances(as_points("distances: x", x, 3) - self.shift)
 
     @property
     def bounds(self) -> np.ndarray:
@@ -103,9 +118,28 @@ class SolidTool:
         """
         raise NotImplementedError
 
+    def _distances(self, x: np.ndarray) -> Distances:
+        """Return distances, normals and Hessians at positions x relative to the unmoved tool, shape (n, 3), length."""
+        raise NotImplementedError
+
     def _surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Return vertices, shape (n, 3), length, and vertex numbers of triangles, shape (m, 3), of the unmoved tool."""
         raise NotImplementedError
+
+
+def nearest_of(parts: list[Distances]) -> Distances:
+    """Return the distances of points from the union of several solids.
+
+    Positive distances are inside. The largest distance from a solid is the distance from the union, exactly outside.
+
+    Args:
+        parts: distances of the same n points from each solid.
+    """
+    if len(parts) == 1:
+        return parts[0]
+    nearest = np.argmax([part.distance for part in parts], axis=0)
+    rows = np.arange(len(nearest))
+    return Distances(*(np.stack(arrays)[nearest, rows] for arrays in zip(*parts)))
 
 
 class Swept(SolidTool):
@@ -130,20 +164,8 @@ class Swept(SolidTool):
         self.profile, self.kind, self.half, self.corner, self.along = profile, kind, half, corner, along
         self.sized = profile.sized
 
-    def distances(self, x: np.ndarray) -> Distances:
-        """Return the signed distances of points from the tool, with exact first and second derivatives.
-
-        Args:
-            x: positions, shape (n, 3), length.
-
-        Returns:
-            Distances (positive inside the tool), normals (into the tool) and Hessians at the n points.
-
-        >>> found = fx.tools.revolved(fx.tools.sphere(radius=10.0, z=-10.0)).distances([[0.0, 0.0, -8.0]])
-        >>> found.distance.tolist(), found.normal.tolist()
-        ([2.0], [[0.0, 0.0, 1.0]])
-        """
-        x = as_points("distances: x", x, 3) - self.shift
+    def _distances(self, x):
+        """Return distances, normals and Hessians at positions x relative to the unmoved tool, shape (n, 3), length."""
         r, way, bend = self._profile_coordinate(x)
         found = self.profile.nearest(np.column_stack([r, x[:, 2]]))
         normal, tangent = (v[:, :1] * way + v[:, 1:] * [0.0, 0.0, 1.0] for v in (found.normal, found.tangent))

@@ -1,41 +1,59 @@
-"""Rigid tools in three dimensions from STL files: closed surfaces of triangles."""
+"""Rigid tools in three dimensions from STL and STEP files: closed smooth surfaces through triangles."""
 
 from __future__ import annotations
 
 import os
-from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, check_type, direction, file_path, positive
+from ...errors import InputError, check_type, direction, file_path, finite, positive
 from ...io.stl import volume
-from ...mesh.edges import edges_of
-from .bodies import merged, separate_bodies
-from .solid_tool import SolidTool
+from .bodies import separate_bodies
+from .corner_normals import corner_normals
+from .patches import PatchSurface, area_vectors
+from .solid_tool import SolidTool, nearest_of
+from .step_reader import read_step
+from .stl_reader import check_closed, read_stl
+
+CREASE = 40.0
+"""Angle between triangles from which on their edge is sharp, degrees, without a `crease`."""
+
+_STEP_ENDINGS = (".step", ".stp")
 
 
 class Triangulated(SolidTool):
-    """Rigid tool bounded by a closed surface of triangles, whose normals point out of the tool.
+    """Rigid tool bounded by a closed surface through triangles, whose normals point out of the tool.
 
-    VTK computes the exact distance to the triangles. The normal at the nearest point gives the sign.
+    The surface is smooth: a curved patch on each triangle, with common tangent planes of neighbours
+    (`formingx.extensions.space.patches`), except at sharp edges.
 
     Args:
         points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
+        triangles: vertex numbers, shape (m, 3), counter-clockwise seen from outside.
         name: name of the file from which the surface was read.
+        normals: unit normals at the corners of the triangles, out of the tool, shape (m, 3, 3); None: they are fitted
+            to the triangles.
+        crease: angle between triangles from which on their edge is sharp, degrees. 0: the surface is the flat
+            triangles.
 
     Attributes:
         name: name of the file from which the surface was read.
         triangles: number of triangles.
-        volume: volume inside the surface, length^3. If it consists of several bodies that overlap, the common volume
-            counts twice.
+        volume: volume inside the flat triangles, length^3. If the surface consists of several bodies that overlap, the
+            common volume counts twice.
         middle: mean of the vertices, shape (3,), length.
+        crease: angle between triangles from which on their edge is sharp, degrees.
     """
 
-    def __init__(self, points: np.ndarray, triangles: np.ndarray, name: str):
-        self._points, self._triangles, self.name = points, triangles, name
-        self._groups = separate_bodies(points, triangles, f"solid: {name!r}")
-        self._implicit: list[Any] = []
+    def __init__(self, points: np.ndarray, triangles: np.ndarray, name: str, normals: np.ndarray | None = None,
+                 crease: float = CREASE):
+        self._points, self._triangles, self.name, self.crease = points, triangles, name, crease
+        self._bodies = separate_bodies(points, triangles, f"solid: {name!r}")
+        self._exact_normals = normals is not None and crease > 0
+        if normals is None or crease == 0:
+            normals = corner_normals(points, triangles, crease)
+        self._normals = normals
+        self.surfaces = [PatchSurface(points, triangles[rows], normals[rows]) for rows in self._bodies]
         self.triangles, self.volume = len(triangles), round(volume(points, triangles), 12)
         self.middle = points.mean(0)
 
@@ -44,18 +62,11 @@ class Triangulated(SolidTool):
 
         x: positions, shape (n, 3), length.
         """
-        from vtkmodules.util.numpy_support import numpy_to_vtk, vtk_to_numpy
-        from vtkmodules.vtkCommonCore import vtkDoubleArray
-        if not self._implicit:
-            self._implicit = [_implicit(self._points, group) for group in self._groups]
-        if not len(x):
-            return np.zeros(0)
-        given, found = numpy_to_vtk(np.ascontiguousarray(x), deep=True), np.full(len(x), -np.inf)
-        for implicit in self._implicit:
-            out = vtkDoubleArray()
-            implicit.FunctionValue(given, out)
-            np.maximum(found, -vtk_to_numpy(out), out=found)
-        return found
+        return np.max([surface.distance(x) for surface in self.surfaces], axis=0, initial=-np.inf)
+
+    def _distances(self, x):
+        """Return distances, normals and Hessians at positions x relative to the unmoved tool, shape (n, 3), length."""
+        return nearest_of([surface.distances(x) for surface in self.surfaces])
 
     def _surface(self):
         """Return vertices, shape (n, 3), length, and vertex numbers of triangles, shape (m, 3), of the unmoved tool."""
@@ -76,30 +87,50 @@ class Triangulated(SolidTool):
             90 if there is none}.
         """
         from scipy.spatial import ConvexHull
-        way = direction("undercuts: along", along)
-        corners = self._points[self._triangles]
-        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        area = np.linalg.norm(normal, axis=1) / 2
+        way, normal = direction("undercuts: along", along), area_vectors(self._points, self._triangles)
+        area, middle = np.linalg.norm(normal, axis=1) / 2, self._points[self._triangles].mean(1)
         hull = ConvexHull(self._points).equations
-        depth = -(corners.mean(1) @ hull[:, :3].T + hull[:, 3]).max(1)
+        depth = -(middle @ hull[:, :3].T + hull[:, 3]).max(1)
         near = 1e-6 * np.ptp(self._points, axis=0).max()
-        inner = (depth > near) & (self._distance(corners.mean(1) + near * normal / (2 * area[:, None])) <= 0)
+        inner = (depth > near) & ~self._covered(middle + near * normal / (2 * area[:, None]))
         draft = np.degrees(np.arcsin(np.clip(normal @ way / (2 * area), -1, 1)))
         under = inner & (draft < -0.01)
         return {"undercut_area": float(area[under].sum()),
                 "min_draft": float(draft[inner & ~under].min(initial=90.0))}
 
+    def _covered(self, middle: np.ndarray) -> np.ndarray:
+        """Return the mask of the triangles that lie inside another body of the tool, shape (m,).
+
+        middle: a point slightly outside each triangle, shape (m, 3), length.
+        """
+        found = np.zeros(self.triangles, dtype=bool)
+        for k, rows in enumerate(self._bodies):
+            for other in (*self.surfaces[:k], *self.surfaces[k + 1:]):
+                found[rows] |= other.distance(middle[rows]) > 0
+        return found
+
     def __repr__(self) -> str:
         return f"solid({self.name!r})"
 
 
-def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False) -> Triangulated:
-    """Read a rigid tool from an STL file, binary or text, with one or more closed surfaces of triangles.
+def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False, crease: float = CREASE,
+          size: float | None = None, angle: float = 15.0) -> Triangulated:
+    """Read a rigid tool with a smooth surface from an STL file, binary or text, or from a STEP file.
+
+    The surface passes through the vertices of the triangles, and is smooth except at sharp edges. An STL file has one
+    or more closed surfaces of triangles, whose normals are fitted. A STEP file has one or more solids. gmsh makes
+    triangles on them, with exact normals, and converts their lengths to mm.
 
     Args:
-        file: path of the STL file.
-        scale: unit of length of the file over the unit of the scene: 25.4 for a file in inches and a sheet in mm.
-        inverted: True if the triangles of the file look inward.
+        file: path of the file; a name that ends in .step or .stp is that of a STEP file.
+        scale: unit of length of the file over the unit of the scene: 25.4 for an STL file in inches and a sheet in mm,
+            0.1 for a STEP file and a sheet in cm.
+        inverted: True if the triangles of an STL file look inward.
+        crease: angle between triangles from which on their edge is sharp, degrees. 0: the surface is the flat
+            triangles. With a STEP file edges are sharp where they are drawn so, for every crease above 0.
+        size: largest edge length of the triangles on a STEP file, in the unit of the scene; None: a quarter of the
+            largest extent. Curved surfaces have smaller triangles.
+        angle: largest angle that a curved surface of a STEP file turns within one triangle, degrees.
 
     Returns:
         The tool.
@@ -113,88 +144,21 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
     >>> mould.triangles, round(mould.undercuts()["min_draft"], 1)
     (768, 5.0)
     """
-    name = os.fspath(file_path("solid: file", file))
-    points, triangles = merged(*_read(name))
-    points = points * positive("solid: scale", scale)
-    _check_closed(points, triangles, f"solid: {name!r}")
+    name, scale = os.fspath(file_path("solid: file", file)), positive("solid: scale", scale)
+    crease = finite("solid: crease", crease)
+    if not 0 <= crease < 90:
+        raise InputError(f"solid: crease = {crease!r}: must be an angle from 0 to less than 90 degrees")
+    normals = None
+    if name.lower().endswith(_STEP_ENDINGS):
+        if not 0 < finite("solid: angle", angle) <= 45:
+            raise InputError(f"solid: angle = {angle!r}: must be above 0 and at most 45 degrees")
+        points, triangles, normals = read_step(name, None if size is None else positive("solid: size", size) / scale,
+                                               angle)
+    else:
+        points, triangles = read_stl(name)
+    check_closed(points, triangles, f"solid: {name!r}")
     if check_type("solid: inverted", inverted, bool, "True or False"):
-        triangles = triangles[:, ::-1]
+        triangles, normals = triangles[:, ::-1], None
     if volume(points, triangles) <= 0:
         raise InputError(f"solid: {name!r} is inside out: its triangles look inward: use inverted={not inverted}")
-    return Triangulated(points, triangles, os.path.basename(name))
-
-
-def _read(name: str) -> tuple[np.ndarray, np.ndarray]:
-    """Return the corners of the m triangles of an STL file, shape (3 m, 3), and their corner numbers, shape (m, 3).
-
-    name: path of the file.
-
-    Raises:
-        InputError: the file cannot be read, or is no STL file of a solid.
-    """
-    try:
-        with open(name, "rb") as stream:
-            data = stream.read()
-    except OSError as error:
-        raise InputError(f"solid: {name!r} cannot be read: {error}") from None
-    n = int(np.frombuffer(data[80:84], "<u4")[0]) if len(data) >= 84 else -1
-    if len(data) == 84 + 50 * n:
-        rows = np.frombuffer(data[84:], dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
-        points = rows["corners"].astype(float).reshape(-1, 3)
-    else:
-        words = data.split()
-        at = [k for k, word in enumerate(words) if word.lower() == b"vertex"]
-        try:
-            points = np.array([[float(w) for w in words[k + 1:k + 4]] for k in at]).reshape(-1, 3)
-        except ValueError:
-            raise InputError(f"solid: {name!r} is no STL file: a vertex is not three numbers") from None
-    if len(points) < 12 or len(points) % 3 or not np.isfinite(points).all():
-        raise InputError(f"solid: {name!r} is no STL file of a solid: it has {len(points)} corners of triangles, which"
-                         f" must be finite and at least 12")
-    return points, np.arange(len(points)).reshape(-1, 3)
-
-
-def _check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None:
-    """Raise an InputError unless the triangles of a surface are closed and oriented alike.
-
-    Each edge must belong to as many triangles in one direction as in the other.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        caller: name of the caller, for messages.
-    """
-    directed, edges, numbers, times = edges_of(triangles)
-    sense = np.zeros(len(edges))
-    np.add.at(sense, numbers, np.where(directed[:, 0] < directed[:, 1], 1.0, -1.0))
-    for bad, words in ((times == 1, "is open: {n} edges have a triangle on one side only, one at {at}: close the holes"
-                                    " where it was drawn"),
-                       (times % 2 == 1, "has {n} edges with an odd number of triangles, one at {at}: it crosses itself,"
-                                        " or holds a sheet without thickness"),
-                       (sense != 0, "has triangles that look the other way than their neighbours, at {n} edges, one at"
-                                    " {at}: let the program that wrote it unify its normals")):
-        if bad.any():
-            x = points[edges[np.argmax(bad)]].mean(0)
-            at = "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
-            raise InputError(f"{caller} {words.format(n=int(bad.sum()), at=at)}")
-
-
-def _implicit(points: np.ndarray, triangles: np.ndarray) -> Any:
-    """Return VTK's function of the signed distance from a surface of triangles, negative inside.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-    """
-    from vtkmodules.util.numpy_support import numpy_to_vtk, numpy_to_vtkIdTypeArray
-    from vtkmodules.vtkCommonCore import vtkPoints
-    from vtkmodules.vtkCommonDataModel import vtkCellArray, vtkPolyData
-    from vtkmodules.vtkFiltersCore import vtkImplicitPolyDataDistance
-    where, cells, surface, found = vtkPoints(), vtkCellArray(), vtkPolyData(), vtkImplicitPolyDataDistance()
-    where.SetData(numpy_to_vtk(np.ascontiguousarray(points), deep=True))
-    rows = np.column_stack([np.full(len(triangles), 3), triangles]).astype(np.int64).ravel()
-    cells.SetCells(len(triangles), numpy_to_vtkIdTypeArray(rows, deep=True))
-    surface.SetPoints(where)
-    surface.SetPolys(cells)
-    found.SetInput(surface)
-    return found
+    return Triangulated(scale * points, triangles, os.path.basename(name), normals, crease)

@@ -1,0 +1,357 @@
+"""Nearest points of a surface of patches (`patches`), computed in C.
+
+Contact asks for the distances of all points of a sheet in each iteration. The nearest point of a patch is found by
+Newton's method. A tree of bounding boxes leaves few patches for each point (Ericson, Real-Time Collision Detection,
+2005, chapters 5.1.5 and 6). The functions are compiled once, into the cache folder of compiled forms.
+
+Libraries with a search tree (`scipy.spatial.cKDTree`, VTK, `dolfinx.geometry`) find the nearest of points, of flat
+triangles or of boxes. None of them takes a distance to curved patches as the bound of its search.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..._jit import functions
+
+_HEADER = """
+long build(long, const double *, double *, long *, long *);
+void nearest(long, const double *, const double *, const long *, const long *, const double *, const double *,
+             const double *, double *, double *, double *, long *);
+void evaluate(long, const long *, const double *, const double *, double *);
+"""
+
+_SOURCE = r"""
+#include <math.h>
+#include <string.h>
+
+enum {LEAF = 4, CONTROL_POINTS = 18, ROOM = 128, ITERATIONS = 30};
+
+/* a function of (u, v) with its first and second derivatives */
+typedef struct { double f, u, v, uu, uv, vv; } jet;
+
+static jet mul(jet a, jet b)
+{
+    jet c = {a.f * b.f, a.u * b.f + a.f * b.u, a.v * b.f + a.f * b.v, a.uu * b.f + 2 * a.u * b.u + a.f * b.uu,
+             a.uv * b.f + a.u * b.v + a.v * b.u + a.f * b.uv, a.vv * b.f + 2 * a.v * b.v + a.f * b.vv};
+    return c;
+}
+
+static jet scale(double s, jet a)
+{
+    jet c = {s * a.f, s * a.u, s * a.v, s * a.uu, s * a.uv, s * a.vv};
+    return c;
+}
+
+static jet over(jet a, jet b)
+{
+    jet c;
+    c.f = a.f / b.f; c.u = (a.u - c.f * b.u) / b.f; c.v = (a.v - c.f * b.v) / b.f;
+    c.uu = (a.uu - 2 * c.u * b.u - c.f * b.uu) / b.f;
+    c.uv = (a.uv - c.u * b.v - c.v * b.u - c.f * b.uv) / b.f;
+    c.vv = (a.vv - 2 * c.v * b.v - c.f * b.vv) / b.f;
+    return c;
+}
+
+/* a^2 b / (a + b) */
+static jet share(jet a, jet b)
+{
+    jet s = {a.f + b.f, a.u + b.u, a.v + b.v, 0, 0, 0}, zero = {0, 0, 0, 0, 0, 0};
+    return s.f < 1e-13 ? zero : over(mul(mul(a, a), b), s);
+}
+
+/* position of a patch at (u, v) with its derivatives: S, u, v, uu, uv, vv */
+static void patch(const double *P, double u, double v, double S[6][3])
+{
+    jet b[3] = {{u, 1, 0, 0, 0, 0}, {v, 0, 1, 0, 0, 0}, {1 - u - v, -1, -1, 0, 0, 0}}, s[3], c[CONTROL_POINTS];
+    for (int k = 0; k < 3; k++) s[k] = mul(b[k], b[k]);
+    for (int k = 0; k < 3; k++) {
+        int l = (k + 1) % 3, m = (k + 2) % 3;
+        jet kl = mul(b[k], b[l]), t = scale(12, s[k]);
+        c[4 * k] = mul(s[k], s[k]);
+        c[4 * k + 1] = scale(4, mul(s[k], kl));
+        c[4 * k + 2] = scale(6, mul(s[k], s[l]));
+        c[4 * k + 3] = scale(4, mul(kl, s[l]));
+        c[12 + 2 * k] = mul(t, share(b[l], b[m]));              /* of the edge from k to l */
+        c[13 + 2 * k] = mul(t, share(b[m], b[l]));              /* of the edge from k to m */
+    }
+    memset(S, 0, 18 * sizeof(double));
+    for (int j = 0; j < CONTROL_POINTS; j++)
+        for (int i = 0; i < 3; i++) {
+            double p = P[3 * j + i];
+            S[0][i] += c[j].f * p; S[1][i] += c[j].u * p; S[2][i] += c[j].v * p;
+            S[3][i] += c[j].uu * p; S[4][i] += c[j].uv * p; S[5][i] += c[j].vv * p;
+        }
+}
+
+static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+
+static void cross(const double *a, const double *b, double *c)
+{
+    c[0] = a[1] * b[2] - a[2] * b[1]; c[1] = a[2] * b[0] - a[0] * b[2]; c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
+static double away(const double *p, const double *x, double *r)
+{
+    for (int i = 0; i < 3; i++) r[i] = p[i] - x[i];
+    return dot(r, r);
+}
+
+/* barycentric coordinates u, v of the nearest point of the flat triangle a, b, c (Ericson, chapter 5.1.5) */
+static void flat(const double *a, const double *b, const double *c, const double *x, double *u, double *v)
+{
+    double p[3], q[3], r[3];
+    for (int i = 0; i < 3; i++) { p[i] = b[i] - a[i]; q[i] = c[i] - a[i]; r[i] = x[i] - a[i]; }
+    double d1 = dot(p, r), d2 = dot(q, r);
+    if (d1 <= 0 && d2 <= 0) { *u = 1; *v = 0; return; }
+    for (int i = 0; i < 3; i++) r[i] = x[i] - b[i];
+    double d3 = dot(p, r), d4 = dot(q, r);
+    if (d3 >= 0 && d4 <= d3) { *u = 0; *v = 1; return; }
+    double vc = d1 * d4 - d3 * d2;
+    if (vc <= 0 && d1 >= 0 && d3 <= 0) { double t = d1 / (d1 - d3); *u = 1 - t; *v = t; return; }
+    for (int i = 0; i < 3; i++) r[i] = x[i] - c[i];
+    double d5 = dot(p, r), d6 = dot(q, r);
+    if (d6 >= 0 && d5 <= d6) { *u = 0; *v = 0; return; }
+    double vb = d5 * d2 - d1 * d6;
+    if (vb <= 0 && d2 >= 0 && d6 <= 0) { double t = d2 / (d2 - d6); *u = 1 - t; *v = 0; return; }
+    double va = d3 * d6 - d5 * d4;
+    if (va <= 0 && d4 - d3 >= 0 && d5 - d6 >= 0) {
+        double t = (d4 - d3) / ((d4 - d3) + (d5 - d6));
+        *u = 0; *v = 1 - t; return;
+    }
+    double all = 1 / (va + vb + vc);
+    *v = vb * all; *u = 1 - *v - vc * all;
+}
+
+/* the point of the flat triangle of a patch at (u, v), with derivatives; returns the squared distance from x */
+static double on_flat(const double *P, const double *x, double u, double v, double S[6][3])
+{
+    double r[3];
+    memset(S, 0, 18 * sizeof(double));
+    for (int i = 0; i < 3; i++) {
+        S[0][i] = u * P[i] + v * P[12 + i] + (1 - u - v) * P[24 + i];
+        S[1][i] = P[i] - P[24 + i]; S[2][i] = P[12 + i] - P[24 + i];
+    }
+    return away(S[0], x, r);
+}
+
+/* the step along an edge of the triangle that lowers the distance most; on: is (u, v) on the edges u, v, w = 0 */
+static void along_an_edge(const int *on, const double *g, double A, double B, double C, double *du, double *dv)
+{
+    static const double ways[3][2] = {{0, 1}, {1, 0}, {1, -1}};
+    double best = 0, bu = 0, bv = 0;
+    for (int k = 0; k < 3; k++) {
+        if (!on[k]) continue;
+        double p = ways[k][0], q = ways[k][1], slope = g[0] * p + g[1] * q, h = A * p * p + 2 * B * p * q + C * q * q;
+        double t = -slope / h, eu = t * p, ev = t * q;
+        if ((on[0] && eu < 0) || (on[1] && ev < 0) || (on[2] && eu + ev > 1e-18)) continue;
+        if (slope * t < best) { best = slope * t; bu = eu; bv = ev; }
+    }
+    *du = bu; *dv = bv;
+}
+
+/* the nearest point of a patch, by Newton's method from (u, v) in the triangle; returns the squared distance */
+static double project(const double *P, const double *x, double u, double v, double S[6][3], double *pu, double *pv)
+{
+    double r[3], f;
+    patch(P, u, v, S);
+    f = away(S[0], x, r);
+    for (int it = 0; it < ITERATIONS; it++) {
+        double w = 1 - u - v, g[2] = {dot(r, S[1]), dot(r, S[2])};
+        double a = dot(S[1], S[1]), b = dot(S[1], S[2]), c = dot(S[2], S[2]);
+        double A = a + dot(r, S[3]), B = b + dot(r, S[4]), C = c + dot(r, S[5]);
+        if (!(A > 1e-3 * a && A * C - B * B > 1e-6 * a * c)) { A = a; B = b; C = c; }
+        double det = A * C - B * B, du = -(C * g[0] - B * g[1]) / det, dv = -(A * g[1] - B * g[0]) / det;
+        int on[3] = {u <= 0, v <= 0, w <= 1e-15};
+        if ((on[0] && du < 0) || (on[1] && dv < 0) || (on[2] && du + dv > 0))
+            along_an_edge(on, g, A, B, C, &du, &dv);
+        double most = 1;                                      /* stays in the triangle */
+        if (du < 0 && u + most * du < 0) most = -u / du;
+        if (dv < 0 && v + most * dv < 0) most = -v / dv;
+        if (du + dv > 0 && most * (du + dv) > w) most = w / (du + dv);
+        if (fabs(du) + fabs(dv) < 1e-13 || most * (fabs(du) + fabs(dv)) < 1e-14) break;
+        int better = 0;
+        for (int half = 0; half < 12; half++, most /= 2) {
+            double nu = u + most * du, nv = v + most * dv, T[6][3], s[3];
+            if (nu < 1e-15) nu = 0;
+            if (nv < 1e-15) nv = 0;
+            if (nu + nv > 1 - 1e-15) { double all = nu + nv; nu /= all; nv /= all; }
+            patch(P, nu, nv, T);
+            double e = away(T[0], x, s);
+            if (e <= f * (1 + 1e-15)) {
+                better = e < f * (1 - 1e-14);
+                u = nu; v = nv; f = e;
+                memcpy(S, T, 18 * sizeof(double)); memcpy(r, s, 3 * sizeof(double));
+                break;
+            }
+        }
+        if (!better) break;
+    }
+    *pu = u; *pv = v;
+    return f;
+}
+
+static double middle(const double *box, int axis) { return box[axis] + box[3 + axis]; }
+
+/* sort items so that the first k boxes lie before the others along an axis (quickselect) */
+static void divide(long n, long *items, const double *box, int axis, long k)
+{
+    long lo = 0, hi = n - 1;
+    while (lo < hi) {
+        double pivot = middle(box + 6 * items[(lo + hi) / 2], axis);
+        long i = lo, j = hi;
+        while (i <= j) {
+            while (middle(box + 6 * items[i], axis) < pivot) i++;
+            while (middle(box + 6 * items[j], axis) > pivot) j--;
+            if (i <= j) { long t = items[i]; items[i] = items[j]; items[j] = t; i++; j--; }
+        }
+        if (k <= j) hi = j; else if (k >= i) lo = i; else break;
+    }
+}
+
+static long branch(long first, long n, const double *box, double *nodes, long *links, long *items, long *used)
+{
+    long me = (*used)++;
+    double *b = nodes + 6 * me;
+    for (int i = 0; i < 3; i++) { b[i] = 1e300; b[3 + i] = -1e300; }
+    for (long k = first; k < first + n; k++)
+        for (int i = 0; i < 3; i++) {
+            b[i] = fmin(b[i], box[6 * items[k] + i]); b[3 + i] = fmax(b[3 + i], box[6 * items[k] + 3 + i]);
+        }
+    if (n <= LEAF) { links[2 * me] = -1 - first; links[2 * me + 1] = n; return me; }
+    int axis = 0;
+    for (int i = 1; i < 3; i++) if (b[3 + i] - b[i] > b[3 + axis] - b[axis]) axis = i;
+    divide(n, items + first, box, axis, n / 2);
+    links[2 * me] = branch(first, n / 2, box, nodes, links, items, used);
+    links[2 * me + 1] = branch(first + n / 2, n - n / 2, box, nodes, links, items, used);
+    return me;
+}
+
+/* tree of n boxes (n, 6): the boxes of its nodes (2 n, 6), their children or leaves (2 n, 2), order of the items (n) */
+long build(long n, const double *box, double *nodes, long *links, long *items)
+{
+    long used = 0;
+    for (long k = 0; k < n; k++) items[k] = k;
+    branch(0, n, box, nodes, links, items, &used);
+    return used;
+}
+
+static double to_box(const double *b, const double *x)
+{
+    double s = 0;
+    for (int i = 0; i < 3; i++) {
+        double d = fmax(fmax(b[i] - x[i], x[i] - b[3 + i]), 0.0);
+        s += d * d;
+    }
+    return s;
+}
+
+/* Hessian of the distance d at a nearest point with derivatives S and unit normal N: -K / (1 + K d) for the two
+   principal curvatures K of the surface, in their directions */
+static void curved(double S[6][3], const double *N, double d, double *H)
+{
+    double e[3], h[3], a = sqrt(dot(S[1], S[1]));
+    for (int i = 0; i < 3; i++) e[i] = S[1][i] / a;
+    cross(N, e, h);
+    double p = dot(S[2], e), q = dot(S[2], h);                /* [a p; 0 q]: derivative in the tangent frame */
+    double L = dot(S[3], N), M = dot(S[4], N), R = dot(S[5], N);
+    double k11 = L / (a * a), k12 = (M / a - L * p / (a * a)) / q;
+    double k22 = (R - 2 * p * M / a + p * p * L / (a * a)) / (q * q);
+    double m = (k11 + k22) / 2, g = sqrt((k11 - k22) * (k11 - k22) / 4 + k12 * k12), K[2] = {m + g, m - g}, T[2];
+    for (int i = 0; i < 2; i++) T[i] = K[i] / fmax(1 + K[i] * d, 0.1);
+    double f1 = g > 1e-14 * fabs(m) + 1e-300 ? (T[0] - T[1]) / (2 * g) : 0, f0 = (T[0] + T[1]) / 2 - f1 * m;
+    double t11 = f0 + f1 * k11, t12 = f1 * k12, t22 = f0 + f1 * k22;
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            H[3 * i + j] = t11 * e[i] * e[j] + t12 * (e[i] * h[j] + h[i] * e[j]) + t22 * h[i] * h[j];
+}
+
+/* Hessian of the distance d = -|r| from an edge or a corner at the end of r, with derivatives S at (u, v) and the unit
+   normal n: (1 - n n^T - t t^T share) / d, where t is the direction of the edge; its curvature gives the share */
+static void sharp(double S[6][3], const double *uv, const double *n, const double *r, double d, double *H)
+{
+    int on[3] = {uv[0] <= 1e-9, uv[1] <= 1e-9, uv[0] + uv[1] >= 1 - 1e-9};
+    double t[3], bend[3], share = 0;
+    for (int i = 0; i < 3; i++) {
+        t[i] = on[0] ? S[2][i] : on[1] ? S[1][i] : S[1][i] - S[2][i];
+        bend[i] = on[0] ? S[5][i] : on[1] ? S[3][i] : S[3][i] - 2 * S[4][i] + S[5][i];
+    }
+    double square = dot(t, t), along = dot(bend, t);
+    for (int i = 0; i < 3; i++) bend[i] -= along * t[i] / square;
+    for (int i = 0; i < 3; i++) t[i] /= sqrt(square);
+    if (on[0] + on[1] + on[2] == 1) share = 1 / fmax(1 - dot(r, bend) / square, 0.1);
+    for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+            H[3 * i + j] = ((i == j) - n[i] * n[j] - share * t[i] * t[j]) / d;
+}
+
+/* signed distance (positive inside), unit normal (into the tool), Hessian and nearest triangle of n points. bulges: the
+   largest distance of the control points of each patch from its flat triangle, 0 for a flat patch. Of patches that are
+   equally near, as at an edge, the one that meets the line to the point most squarely counts: it gives the sign. */
+void nearest(long n, const double *X, const double *nodes, const long *links, const long *items, const double *boxes,
+             const double *bulges, const double *patches, double *distance, double *normal, double *hessian,
+             long *triangle)
+{
+    for (long k = 0; k < n; k++) {
+        const double *x = X + 3 * k;
+        double best = 1e300, square = 0, uv[2] = {0, 0}, Sb[6][3];
+        long stack[ROOM], found = -1; int top = 0;
+        stack[top++] = 0;
+        while (top) {
+            long me = stack[--top];
+            if (to_box(nodes + 6 * me, x) > best * (1 + 1e-9)) continue;
+            if (links[2 * me] >= 0) {
+                long a = links[2 * me], b = links[2 * me + 1];
+                int other = to_box(nodes + 6 * a, x) < to_box(nodes + 6 * b, x);
+                stack[top++] = other ? b : a; stack[top++] = other ? a : b;
+                continue;
+            }
+            long first = -1 - links[2 * me];
+            for (long j = first; j < first + links[2 * me + 1]; j++) {
+                long t = items[j];
+                if (to_box(boxes + 6 * t, x) > best * (1 + 1e-9)) continue;
+                const double *P = patches + 3 * CONTROL_POINTS * t;
+                double u, v, S[6][3], N[3], r[3];
+                flat(P, P + 12, P + 24, x, &u, &v);
+                double f = on_flat(P, x, u, v, S);
+                double least = fmax(sqrt(f) - bulges[t], 0);  /* of the distance to the patch */
+                if (least * least > best * (1 + 1e-9)) continue;
+                if (bulges[t] > 0) f = project(P, x, u, v, S, &u, &v);
+                if (f > best * (1 + 1e-9)) continue;
+                cross(S[1], S[2], N);
+                away(S[0], x, r);
+                double s = fabs(dot(r, N)) / sqrt(dot(N, N) * fmax(f, 1e-300));
+                if (f < best * (1 - 1e-9) || s > square) {
+                    if (f < best) best = f;
+                    square = s; found = t; uv[0] = u; uv[1] = v; memcpy(Sb, S, sizeof Sb);
+                }
+            }
+        }
+        double N[3], r[3];
+        cross(Sb[1], Sb[2], N);
+        double size = sqrt(dot(N, N));
+        for (int i = 0; i < 3; i++) { N[i] /= size; r[i] = x[i] - Sb[0][i]; }
+        double s = dot(r, N), d = sqrt(dot(r, r)), *n3 = normal + 3 * k, *H = hessian + 9 * k;
+        distance[k] = d = s > 0 ? -d : d;
+        if (triangle) triangle[k] = found;
+        if (!normal) continue;
+        int crease = square < 1 - 1e-7 && fabs(d) > 1e-7 * sqrt(size);
+        for (int i = 0; i < 3; i++) n3[i] = crease ? r[i] / d : -N[i];
+        memset(H, 0, 9 * sizeof(double));
+        if (crease) sharp(Sb, uv, n3, r, d, H);
+        else if (bulges[found] > 0) curved(Sb, N, d, H);
+    }
+}
+
+/* positions and derivatives (n, 6, 3) of n points (u, v) on the patches of the given triangles */
+void evaluate(long n, const long *triangles, const double *patches, const double *uv, double *out)
+{
+    for (long k = 0; k < n; k++)
+        patch(patches + 3 * CONTROL_POINTS * triangles[k], uv[2 * k], uv[2 * k + 1], (double (*)[3])(out + 18 * k));
+}
+"""
+
+
+def compiled() -> Any:
+    """Return the functions in C, compiled at the first call."""
+    return functions("patches", _HEADER, _SOURCE)

@@ -1,0 +1,349 @@
+r"""Normals of a smooth surface at the corners of the triangles of an STL file, which has none.
+
+A curve of constant curvature from a to b, with the unit normals N at its ends, satisfies
+
+.. math:: (N_a + N_b) \cdot (x_b - x_a) = 0.
+
+On planes, cylinders and spheres, and on fillets between them, all edges satisfy this with the exact normals. So the
+normals are fitted to these equations by least squares. Edges at which triangles meet at more than a crease angle are
+sharp, and have different normals on their two sides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...mesh.edges import edges_of
+from .patches import area_vectors, sides_of_edges, unit
+
+_COPLANAR = 1e-4           # angle between triangles below which they are coplanar, radians
+_FILE_PRECISION = 2e-7     # error of coordinates in a file of 32-bit numbers, over the largest coordinate
+_ACROSS = 1e-2             # weight of a pair of vertices across an edge, over that of an edge
+_TIKHONOV = 1e-3           # weight of the mean normals of the triangles around a corner
+_ITERATIONS = 12           # of the least-squares fit
+_CONVERGED = 1e-8          # largest change of a normal at which the fit ends
+_SLOW = 0.2                # ratio of two successive changes above which the equations are factorised again
+_HALF_TURN = 0.1           # of the ratio of two turns from 1/2, at which a plane ends in a curved surface
+_AHEAD = 0.7               # cosine of the largest angle between edges that count as parallel
+_TIP_ANGLE = 0.15          # angle of triangles to the mean normal at a vertex from which it may be a tip, radians
+_TIP_SPREAD = 0.2          # least ratio of the spreads of normals in two directions at a tip
+_PAIRS = 5_000_000         # pairs of edges that are compared at once
+
+
+class Borders(NamedTuple):
+    """Edges between regions of coplanar triangles, seen from one side.
+
+    Attributes:
+        side: number of the side, k m + t for edge k of triangle t, shape (b,).
+        region: region on this side, shape (b,).
+        beyond: region on the other side, shape (b,).
+        turn: angle between the two triangles, shape (b,), radians.
+        away: unit vectors out of the region, in its plane and across the edge, shape (b, 3).
+    """
+
+    side: np.ndarray
+    region: np.ndarray
+    beyond: np.ndarray
+    turn: np.ndarray
+    away: np.ndarray
+
+
+def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
+    """Return unit normals of a smooth surface at the corners of triangles, shape (m, 3, 3).
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3), counter-clockwise seen from outside.
+        crease: angle between triangles from which on their edge is sharp, degrees. 0: all triangles are flat.
+    """
+    if crease == 0:
+        return np.repeat(unit(area_vectors(points, triangles))[:, None], 3, axis=1)
+    groups = corner_groups(points, triangles, np.radians(crease))
+    return fitted_normals(points, triangles, groups, np.radians(crease))[groups]
+
+
+def turns(facet: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
+    """Return the angles between pairs of triangles, shape (k,), radians, exact for small angles.
+
+    Args:
+        facet: unit normals of the triangles, shape (m, 3).
+        i: first triangle of each pair, shape (k,).
+        j: second triangle of each pair, shape (k,).
+    """
+    return np.asarray(2 * np.arcsin(np.clip(np.linalg.norm(facet[i] - facet[j], axis=1) / 2, 0, 1)))
+
+
+def corner_groups(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
+    """Return the number of the group of each corner of each triangle, shape (m, 3).
+
+    The corners of a group are at one vertex and have one normal. Their triangles are connected by edges that are not
+    sharp. At a tip, such as that of a cone, each corner is a group of its own.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        crease: angle between triangles from which on their edge is sharp, radians.
+    """
+    m, facet = len(triangles), unit(area_vectors(points, triangles))
+    i, j = sides_of_edges(triangles)
+    smooth = turns(facet, i % m, j % m) < crease
+    i, j = i[smooth], j[smooth]
+    groups = _connected(m, i, j, np.zeros(len(points), dtype=bool), triangles)
+    tips = _tips(points, triangles, groups, facet, i, j)
+    return _connected(m, i, j, tips, triangles) if tips.any() else groups
+
+
+def _connected(m: int, i: np.ndarray, j: np.ndarray, tips: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return the groups of corners that smooth edges connect, shape (m, 3).
+
+    Args:
+        m: number of triangles.
+        i: one side of each smooth edge, shape (k,).
+        j: the other side, shape (k,).
+        tips: mask of the vertices at which no corners are connected, shape (n,).
+        triangles: vertex numbers, shape (m, 3).
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    s, k, t, l = i % m, i // m, j % m, j // m
+    a = np.concatenate([3 * s + k, 3 * s + (k + 1) % 3])
+    b = np.concatenate([3 * t + (l + 1) % 3, 3 * t + l])
+    kept = ~tips[triangles.ravel()[a]]
+    graph = coo_array((np.ones(kept.sum()), (a[kept], b[kept])), shape=(3 * m, 3 * m))
+    return np.asarray(connected_components(graph, directed=False)[1].reshape(m, 3))
+
+
+def _tips(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, facet: np.ndarray, i: np.ndarray,
+          j: np.ndarray) -> np.ndarray:
+    """Return the mask of the vertices that are tips, shape (n,).
+
+    At a tip the normals of the triangles differ from their mean in all directions, and the surface is straight ahead of
+    the vertex: its triangles turn against the next ones by less than half that angle. At the pole of a sphere they turn
+    by the same angle or more.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        groups: groups of the corners, shape (m, 3).
+        facet: unit normals of the triangles, shape (m, 3).
+        i: one side of each smooth edge, shape (k,).
+        j: the other side, shape (k,).
+    """
+    m, n = len(triangles), int(groups.max()) + 1
+    turn = np.zeros(3 * m)                                    # at side k m + t, 0 at a crease
+    turn[i] = turn[j] = turns(facet, i % m, j % m)
+    N = mean_normals(points, triangles, groups)
+    tilt = np.repeat(facet[:, None], 3, axis=1) - N[groups]
+    away = np.linalg.norm(tilt, axis=2)
+    ahead = turn.reshape(3, m).T[:, [1, 2, 0]]                # across the edge opposite to each corner
+    count = np.bincount(groups.ravel(), minlength=n)
+    straight = np.bincount(groups.ravel(), (ahead < away / 2).ravel(), n) > 0.9 * count
+    least = np.full(n, np.inf)
+    np.minimum.at(least, groups.ravel(), away.ravel())
+    spread = np.zeros((n, 3, 3))
+    np.add.at(spread, groups.ravel(), np.einsum("mki,mkj->mkij", tilt, tilt).reshape(-1, 3, 3))
+    value = np.linalg.eigvalsh(spread)
+    tip = straight & (least > _TIP_ANGLE) & (value[:, 1] > _TIP_SPREAD * value[:, 2])
+    found = np.zeros(len(points), dtype=bool)
+    found[triangles[tip[groups]]] = True
+    return found
+
+
+def mean_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray) -> np.ndarray:
+    """Return for each group of corners the mean normal of its triangles, weighted with their angles, shape (groups, 3).
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        groups: groups of the corners, shape (m, 3).
+    """
+    corners, facet = points[triangles], unit(area_vectors(points, triangles))
+    N = np.zeros((int(groups.max()) + 1, 3))
+    for k in range(3):
+        p, q = unit(corners[:, (k + 1) % 3] - corners[:, k]), unit(corners[:, (k + 2) % 3] - corners[:, k])
+        angle = np.arccos(np.clip((p * q).sum(1), -1, 1))
+        np.add.at(N, groups[:, k], angle[:, None] * facet)
+    return unit(N)
+
+
+def flat_directions(points: np.ndarray, triangles: np.ndarray, crease: float
+                    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Find planes, and directions in which facets are straight.
+
+    Coplanar triangles connected by edges are a region. A facet of a curved surface turns against its neighbour as much
+    as this one against the next. A plane beside a fillet turns half as much against the first facet of the fillet as
+    this one against the second; a cylinder does so along its rulings, where a torus follows. So a region of two
+    triangles or more is straight across an edge if the ratio of the turns there is near 1/2.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        crease: angle between triangles from which on their edge is sharp, radians.
+
+    Returns:
+        Number of the plane to which each triangle belongs, or -1, shape (m,). For k edges across which a region is
+        straight: the triangle, the number of its edge (0, 1, 2), the direction across the edge in its plane, (k, 3).
+    """
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+    m, area = len(triangles), area_vectors(points, triangles)
+    facet, corners = unit(area), points[triangles]
+    longest = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2).max(1)
+    error = _FILE_PRECISION * np.abs(points).max() * longest / np.maximum(np.linalg.norm(area, axis=1), 1e-300)
+    i, j = sides_of_edges(triangles)
+    s, t = i % m, j % m
+    turn = turns(facet, s, t)
+    same = turn < np.maximum(_COPLANAR, 2 * (error[s] + error[t]))
+    graph = coo_array((np.ones(same.sum()), (s[same], t[same])), shape=(m, m))
+    region = connected_components(graph, directed=False)[1]
+    border = ~same & (turn < crease)
+    side, opposite = np.concatenate([i[border], j[border]]), np.concatenate([j[border], i[border]])
+    k, own = side // m, side % m
+    way = unit(corners[own, (k + 1) % 3] - corners[own, k])
+    borders = Borders(side, region[own], region[opposite % m], np.tile(turn[border], 2), np.cross(way, facet[own]))
+    large = np.bincount(region) > 1
+    rows = np.flatnonzero(large[borders.region])
+    ratio = borders.turn[rows] / _turn_ahead(borders, rows)
+    straight = np.zeros(len(side), dtype=bool)
+    straight[rows] = np.abs(ratio - 0.5) < _HALF_TURN
+    bent = np.zeros(len(large), dtype=bool)
+    bent[borders.region[~straight]] = True
+    return (np.where((large & ~bent)[region], region, -1), own[straight], k[straight], borders.away[straight])
+
+
+def _turn_ahead(borders: Borders, rows: np.ndarray) -> np.ndarray:
+    """Return for some borders the largest turn at the far side of the region beyond, shape (k,), radians; inf if none.
+
+    Args:
+        borders: all borders, sorted by nothing.
+        rows: numbers of the k borders.
+    """
+    order = np.argsort(borders.region, kind="stable")
+    first = np.searchsorted(borders.region[order], borders.beyond[rows])
+    count = np.searchsorted(borders.region[order], borders.beyond[rows], side="right") - first
+    found, begin = np.zeros(len(rows)), 0
+    ends = np.cumsum(count)
+    while begin < len(rows):
+        end = max(begin + 1, int(np.searchsorted(ends, (ends[begin - 1] if begin else 0) + _PAIRS)))
+        part = np.arange(begin, end)
+        near = np.repeat(part, count[part])
+        far = order[np.arange(len(near)) + np.repeat(first[part] - (ends[part] - count[part] - ends[begin]
+                                                                    + count[begin]), count[part])]
+        row = rows[near]
+        ahead = (borders.beyond[far] != borders.region[row]) & (
+            np.einsum("ni,ni->n", borders.away[far], borders.away[row]) > _AHEAD)
+        np.maximum.at(found, near[ahead], borders.turn[far[ahead]])
+        begin = end
+    return np.where(found > 0, found, np.inf)
+
+
+def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, crease: float) -> np.ndarray:
+    """Return the normals of the groups of corners, fitted to edges of constant curvature, shape (groups, 3).
+
+    The equations of the edges leave modes in which normals tilt alternately, and planes bulge. So the normals of planes
+    are given, and normals have no part along straight directions (`flat_directions`). The equations of the pairs of
+    vertices across an edge, with a small weight, remove such modes elsewhere.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        groups: groups of the corners, shape (m, 3).
+        crease: angle between triangles from which on their edge is sharp, radians.
+    """
+    from scipy.sparse import coo_array, diags_array
+    area, n = area_vectors(points, triangles), int(groups.max()) + 1
+    facet, N = unit(area), mean_normals(points, triangles, groups)
+    plane, tri, side, way = flat_directions(points, triangles, crease)
+    given = np.zeros((n, 3))
+    for k in range(3):
+        np.add.at(given, groups[plane >= 0, k], area[plane >= 0])
+    fixed = given.any(1)
+    N[fixed] = unit(given[fixed])
+    flat = np.ones(n, dtype=bool)                             # corners whose triangles are all coplanar
+    for k in range(3):
+        np.logical_and.at(flat, groups[:, k], np.linalg.norm(facet - N[groups[:, k]], axis=1) < _COPLANAR)
+    fixed |= flat
+    if fixed.all():
+        return N
+    free, column = np.flatnonzero(~fixed), np.full(n, -1)
+    column[free] = np.arange(len(free))
+    rows, weight, e = _equations(points, triangles, groups)
+    ends = np.concatenate([groups[tri, side], groups[tri, (side + 1) % 3]])       # N . way = 0
+    rows, weight = np.vstack([rows, np.column_stack([ends, ends])]), np.append(weight, np.ones(len(ends)))
+    e = np.concatenate([e, way, way])
+    used = (column[rows] >= 0).any(1)
+    rows, weight, e = rows[used], weight[used], e[used]
+    start, ends, i = N.copy(), rows.ravel(), np.repeat(np.arange(len(rows)), 2)
+    inside, before, factors = column[ends] >= 0, np.inf, None
+    for _ in range(_ITERATIONS):
+        if factors is None:
+            t1 = unit(np.cross(np.eye(3)[np.abs(N).argmin(1)], N))
+            t2 = np.cross(N, t1)
+            blocks = [coo_array(((np.einsum("ij,ij->i", np.repeat(e, 2, 0), t[ends]) * np.repeat(weight, 2))[inside],
+                                 (i[inside], column[ends][inside] + s * len(free))), shape=(len(rows), 2 * len(free)))
+                      for s, t in enumerate((t1, t2))]
+            J = (blocks[0] + blocks[1]).tocsr()
+            factors = _factorised((J.T @ J + diags_array(np.full(2 * len(free), _TIKHONOV**2))).tocsr())
+        off = (N - start)[free]
+        tilt = np.concatenate([(off * t1[free]).sum(1), (off * t2[free]).sum(1)])
+        residual = weight * ((N[rows[:, 0]] + N[rows[:, 1]]) * e).sum(1)
+        step = factors(-J.T @ residual - _TIKHONOV**2 * tilt)
+        N[free] = unit(N[free] + step[:len(free), None] * t1[free] + step[len(free):, None] * t2[free])
+        size = np.abs(step).max()
+        if size < _CONVERGED:
+            break
+        if size > _SLOW * before:                             # the factors of an earlier iteration are too far off
+            factors = None
+        before = size
+    return N
+
+
+def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
+    """Return the function that solves a system of equations for a right-hand side, shape (n,); MUMPS factorises it.
+
+    Args:
+        matrix: symmetric positive definite matrix of scipy in compressed rows, shape (n, n).
+    """
+    from petsc4py import PETSc
+    first, columns = (part.astype(PETSc.IntType) for part in (matrix.indptr, matrix.indices))
+    A = PETSc.Mat().createAIJ(matrix.shape, csr=(first, columns, matrix.data), comm=PETSc.COMM_SELF)
+    A.setOption(PETSc.Mat.Option.SPD, True)
+    factors = PETSc.PC().create(PETSc.COMM_SELF)
+    factors.setOperators(A)
+    factors.setType("cholesky")
+    factors.setFactorSolverType("mumps")
+    factors.setUp()
+    x, b = A.createVecs()
+
+    def solve(right: np.ndarray) -> np.ndarray:
+        """Return the solution for a right-hand side, shape (n,)."""
+        b.setArray(right)
+        factors.apply(b, x)
+        return np.array(x.array_r)
+    return solve
+
+
+def _equations(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
+               ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the pairs of groups whose normals satisfy (N_a + N_b) . e = 0.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        groups: groups of the corners, shape (m, 3).
+
+    Returns:
+        Groups of each pair, shape (k, 2); weights of the equations, shape (k,); unit vectors e, shape (k, 3).
+    """
+    x = np.zeros((int(groups.max()) + 1, 3))
+    x[groups.ravel()] = points[triangles.ravel()]
+    apex = np.concatenate([groups[:, (i + 2) % 3] for i in range(3)])
+    edges = edges_of(groups)[1]
+    across = np.column_stack([apex[side] for side in sides_of_edges(groups)])
+    across = across[across[:, 0] != across[:, 1]]
+    rows = np.vstack([edges, across])
+    weight = np.concatenate([np.ones(len(edges)), np.full(len(across), _ACROSS)])
+    return rows, weight, unit(x[rows[:, 1]] - x[rows[:, 0]])
