@@ -185,7 +185,7 @@ MUTANTS = [Mutant(*row) for row in [
      "residual += self.weighted(0.9 * self._scale * work, entry.names)", "kbkz kbkz_scenes"),
     ("forms/tangent.py", "values += assemble(self._by_motion)", "values += 0.5 * assemble(self._by_motion)",
      "derivatives"),
-    ("forms/tangent.py", "if self._by_time and rate[-1]:", "if False:", "derivatives"),
+    ("forms/tangent.py", "if self._by_time and rate[-1]:", "if False:", "time"),
     ("forms/solid.py", "        return F * before", "        return before * F", "state_transfer remesh"),
     ("extensions/space/surface.py", "ufl.inner(f1, f2) / l1, 0]", "0.9 * ufl.inner(f1, f2) / l1, 0]", "space"),
     ("extensions/space/surface.py", "l2 = 1 / ufl.sqrt(l1)", "l2 = 1 / l1", "space"),
@@ -201,7 +201,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("extensions/space/lagged_stick.py", "self.k * (x[sticking] - old.position[sticking])",
      "self.k * 0.5 * (x[sticking] - old.position[sticking])", "space"),
     ("physics/penalty.py", "return turned + np.where(out[4 * n:5 * n] == 0, out[11 * n:], 0.0)", "return turned",
-     "stability"),
+     "contact stability"),
     ("extensions/stability/second_variation.py", "form = form if work is None else form - half * work",
      "form = form if work is None else form - 0.9 * half * work", "stability"),
     ("extensions/kbkz/integral.py", "+ (W * h2)[:, None] * by_I2", "+ 0 * (W * h2)[:, None] * by_I2",
@@ -311,7 +311,7 @@ def main(words: list[str]) -> None:
         for k in chosen(words):
             mutant = MUTANTS[k - 1]
             known[tuple(mutant[:3])] = found = outcome(mutant, tree)
-            print(f"{k:3} {mutant.file}: {mutant.new.splitlines()[0].strip()}: {found}", flush=True)
+            print(f"{k:3} {mutant.file}: {(mutant.new.strip() or 'nothing').splitlines()[0]}: {found}", flush=True)
             with TABLE.open("w", newline="") as stream:
                 rows = csv.writer(stream, lineterminator="\n")
                 rows.writerow(["number", "file", "line", "instead", "tests", "outcome"])

@@ -189,6 +189,18 @@ def test_a_point_slides_after_the_same_slip_at_every_pressure(depth):
     assert back.tangential == pytest.approx(np.zeros(4), abs=1e-6 * mu * found.normal[0])
 
 
+@pytest.mark.parametrize("mu", [0.4, np.inf])
+def test_friction_resists_motion_round_the_axis_as_along_the_tool(mu):
+    """A sticking point has the same tangential stiffness in both directions; one that slides has none across."""
+    law, depth, away = Law(tools.plane(0.0), mu, K, THETA, SLIP), 3 * THETA, np.array([0.0, 0.6, 5.0]) * SLIP
+    start = np.column_stack([np.ones(3), np.full(3, depth)])
+    tangent, old = law.nearest(start).tangent, ContactHistory(start, np.full(3, depth), np.zeros(3), start)
+    x = start + away[:, None] * tangent
+    found = law.hoop_stiffness(x, old, np.ones(3))
+    along = np.einsum("ni,nij,nj->n", tangent, law.tractions(x, old).stiffness, tangent)
+    assert found == pytest.approx(along) and np.array_equal(found > 0, [True, True, np.isinf(mu)])
+
+
 def test_energy_gained_in_a_pressure_cycle_vanishes_with_the_elastic_slip():
     """Slip under little pressure and back under more: the traction returns mu (N2 - N1) g^2 / (2 g_s), no more."""
     mu, low, high = 0.4, 2 * THETA, 10 * THETA

@@ -97,6 +97,23 @@ def test_spin_lowers_the_energy_of_a_mode(component):
     assert quadratic[1] - quadratic[0] == pytest.approx(-3.0 * 0.7 * squared.sum(), rel=1e-9)
 
 
+def test_waves_along_the_depth_of_a_strip():
+    """A motion V along the depth, k waves: 2 c10 |grad V|^2 + 4 c10 k^2 V^2 over an undeformed neo-Hookean strip."""
+    mesh, k = fx.mesh.disc(radius=2.0, thickness=0.8, elements=(4, 2), inner_radius=0.5), 3.0
+    variation = SecondVariation(Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.5),
+                                                 kinematics=fx.PlaneStrain(), supports=[fx.Clamped("rim")])))
+    forms, x = variation.problem.forms, np.zeros(variation.matrix.getLocalSize()[0])
+    sub, dofs = variation.space.sub(0).sub(2).collapse()
+    mode = fem.Function(sub)
+    mode.interpolate(lambda X: (2 - X[0]) * (0.3 + X[1]))
+    x[np.asarray(dofs)] = mode.x.array / forms.length
+    quadratic = x @ (sparse(variation.fill(k)) @ x) * forms.stress * forms.volume
+    g, w = np.polynomial.legendre.leggauss(6)
+    R, Z = np.meshgrid(1.25 + 0.75 * g, 0.4 + 0.4 * g, indexing="ij")
+    density = 2 * 1.5 * ((0.3 + Z) ** 2 + (2 - R) ** 2) + 4 * 1.5 * (k * (2 - R) * (0.3 + Z)) ** 2
+    assert quadratic == pytest.approx((np.outer(0.75 * w, 0.4 * w) * density).sum(), rel=1e-9)
+
+
 @pytest.mark.parametrize("ogden, same", [
     (fx.Ogden(mu=2.0, alpha=2.0), fx.NeoHookean(c10=1.0)),
     (fx.Ogden(mu=(2.0, -0.6), alpha=(2.0, -2.0)), fx.MooneyRivlin(c10=1.0, c01=0.3))], ids=["neo-Hooke", "Mooney"])
