@@ -464,6 +464,41 @@ def test_top_load_of_a_tube():
         fx.top_load(mesh, travel=0.05, modes=[1], floor=fx.tools.plane(-9.0).reversed(), **ends)
 
 
+def thin_tube(wall):
+    """A thin tube of radius and length 1."""
+    return fx.mesh.disc(radius=1 + wall / 2, inner_radius=1 - wall / 2, thickness=1.0, elements=(1, 24))
+
+
+@pytest.mark.parametrize("wall", (0.01, pytest.param(0.003, marks=pytest.mark.thorough)))
+def test_top_load_finds_the_first_mode_by_itself(wall):
+    """Of a thin tube: the default numbers of waves enclose the first mode, which is solved for; walls set the steps."""
+    press = {"material": fx.NeoHookean(c10=1.0), "neck": "top", "foot": "bottom", "travel": 0.9 * wall}
+    found = fx.top_load(thin_tube(wall), **press)
+    numbers = found.stability.numbers
+    assert found.first.solved and 2 < found.first.number < numbers[-1] - 1 and len(numbers) > 0.8 / wall**0.5
+    assert len(found.path) > 3 and "interpolated" not in str(found).split("first")[-1]
+    # a smooth minimum of the force over the number of waves
+    n = found.first.number
+    forces = [found.buckling(k)[0] for k in (n - 2, n - 1, n, n + 1, n + 2)]
+    assert np.all(np.diff(forces, 2) > 0)
+    classical = 2 * np.pi * 3.0 * wall**2 / np.sqrt(3 * (1 - 0.25)) * 2       # E = 3 mu, mu = 2 c10; a free edge: half
+    assert 0.2 * classical < forces[2] < classical
+
+
+def test_top_load_of_a_body_on_its_head():
+    """A pot that was formed with its base up is pressed upwards; both give the same forces."""
+    body = thin_tube(0.1)
+    options = {"material": fx.NeoHookean(c10=1.0), "travel": 0.05, "modes": [2, 3]}
+    upright, upside_down = (fx.top_load(body, neck=neck, foot=foot, **options)
+                            for neck, foot in (("top", "bottom"), ("bottom", "top")))
+    assert upright.up and not upside_down.up and upright.largest_force > 0.01
+    assert upside_down.force == pytest.approx(upright.force, rel=1e-6)
+    assert upside_down.travel == pytest.approx(upright.travel) and upside_down.travel[-1] == pytest.approx(0.05)
+    assert upside_down.energy == pytest.approx(upright.energy, rel=1e-6)
+    with pytest.raises(InputError, match="'top' does not reach it|without a force|starts inside"):
+        fx.top_load(body, neck="bottom", foot="top", up=True, **options)
+
+
 def test_branches_of_a_tube_are_images_of_each_other():
     """The two bulges of an inflated tube, one at each end, are as large at the same volume, and need less pressure."""
     ratio, length, critical = 0.8, np.pi, 1.98640828

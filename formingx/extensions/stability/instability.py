@@ -109,12 +109,12 @@ class CriticalPoint:
         start.measures = path._measures(record.segments[-1], start)
         return path
 
-    def view3d(self, file: Any, scale: float = 0.15) -> Picture:
+    def view3d(self, file: Any, scale: float | None = None) -> Picture:
         """Draw the deformed body with the mode to a PNG file (rank 0 draws).
 
         Args:
             file: path of the PNG file.
-            scale: largest displacement of the mode over the size of the body.
+            scale: largest displacement of the mode over the size of the body; default 0.15, and less for short waves.
 
         Returns:
             The picture.
@@ -406,7 +406,7 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
         numbers = [finite("stability: modes", n) for n in modes]
     except TypeError:
         raise InputError(f"stability: modes = {modes!r}: must be several numbers of waves, such as range(9)") from None
-    axisymmetric, largest = scene.kinematics.axisymmetric, _max_wave_number(scene)
+    axisymmetric, largest = scene.kinematics.axisymmetric, max_wave_number(scene)
     for n in numbers:
         if n < 0 or axisymmetric and n != int(n):
             raise InputError(f"stability: modes: {n:g}: must be at least 0" + ", and whole: waves round the axis"
@@ -440,7 +440,7 @@ def _selected_states(path: Any, states: Any) -> list[State]:
     return [regular[k] for k in picked]
 
 
-def _max_wave_number(scene: Any) -> float:
+def max_wave_number(scene: Any) -> float:
     """Return the largest wave number: waves at the largest radius are as long as the shortest edge of an element."""
     domain = scene.mesh.domain
     domain.topology.create_connectivity(1, domain.topology.dim)

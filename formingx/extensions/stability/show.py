@@ -10,7 +10,11 @@ from ...results import files
 from ...results.show.views import plotted
 
 
-def draw(point: Any, file: Any, scale: float) -> None:
+_STEEPNESS = 0.1
+"""Default of the largest displacement of a drawn mode over the length of its waves: higher waves look like spikes."""
+
+
+def draw(point: Any, file: Any, scale: float | None) -> None:
     """Draw the deformed body with a buckling mode to a PNG file; collective.
 
     The colour is the radial amplitude, or the axial one where the radial is much smaller: red for positive values.
@@ -18,10 +22,10 @@ def draw(point: Any, file: Any, scale: float) -> None:
     Args:
         point: the `CriticalPoint` with the mode.
         file: path of the PNG file.
-        scale: largest displacement of the mode over the size of the body.
+        scale: largest displacement of the mode over the size of the body; None: 0.15, or less for short waves.
     """
     file = files.named("CriticalPoint.view3d", file, ".png")
-    scale = positive("CriticalPoint.view3d: scale", scale)
+    scale = None if scale is None else positive("CriticalPoint.view3d: scale", scale)
     lines, comm = _outline(point), point.path.problem.comm
     files.on_root(comm, lambda: _draw(point, lines, file, scale))
 
@@ -54,7 +58,7 @@ def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     return lines
 
 
-def _draw(point: Any, lines: list, file: Any, scale: float) -> None:
+def _draw(point: Any, lines: list, file: Any, scale: float | None) -> None:
     """Draw the surface that the outlines sweep round the axis, or along the depth in plane strain, to a PNG file.
 
     Args:
@@ -62,13 +66,16 @@ def _draw(point: Any, lines: list, file: Any, scale: float) -> None:
         lines: (deformed positions, amplitudes U, W, V of the mode) at the m points of each boundary, shape (m, 2),
             length, and shape (m, 3), dimensionless.
         file: path of the PNG file.
-        scale: largest displacement of the mode over the size of the body.
+        scale: largest displacement of the mode over the size of the body; None: 0.15, or less for short waves.
     """
     pyvista = figures.pyvista()
     axisymmetric = point.path.problem.scene.kinematics.axisymmetric
     everything = np.vstack([line for line, _ in lines])
-    size = scale * np.ptp(everything, axis=0).max()
-    turn = np.linspace(0, 2 * np.pi, 181) if axisymmetric else np.linspace(
+    size = (0.15 if scale is None else scale) * np.ptp(everything, axis=0).max()
+    if scale is None and point.number:
+        radius = everything[:, 0].max() if axisymmetric else 1.0
+        size = min(size, _STEEPNESS * 2 * np.pi * radius / point.number)
+    turn = np.linspace(0, 2 * np.pi, max(181, 24 * int(point.number) + 1)) if axisymmetric else np.linspace(
         0, 2 * np.pi / point.number if point.number else np.ptp(everything, axis=0).max(), 61)
     high, wide = np.ptp(everything[:, 1]), 2 * everything[:, 0].max()
     flat = high < 0.3 * wide

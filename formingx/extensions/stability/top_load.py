@@ -5,24 +5,27 @@ The body is elastic, without plasticity. Units are the user's; forces are totals
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...errors import ConvergenceError, InputError, check_name, check_type, positive
+from ...forms.outline import Outline
 from ...measures.targets import travel as travel_to
 from ...mesh.mesh import Mesh
 from ...physics.contact import Contact
 from ...physics.supports import PrescribedDisplacement, Symmetry
+from ...problem.problem import Problem
 from ...results.path import Path
 from ...runs import trace
 from ...scene.scene import Scene
 from ...solve.stepping import StepControl
 from ...tools import Tool, plane
 from ...units import NONE, Units
-from .instability import CriticalPoint, Stability, wave_numbers
+from .instability import CriticalPoint, Stability, max_wave_number, wave_numbers
 
 _FOOT: dict[str, Any] = {"points": 16, "penalty": 2.0, "ramp": 1e-4}
 """Arguments of the `Contact` of the foot: enough points on a compliant plate to let the standing ring roll.
@@ -32,7 +35,19 @@ rigid plate a contact line hops from point to point.
 """
 
 _LARGEST_STEP = 0.004
-"""Default of `StepControl.largest`: a crushed wall snaps through along short arcs."""
+"""Largest default of `StepControl.largest`: a crushed wall snaps through along short arcs."""
+
+_STEP_OF_WALL = 0.4
+"""Default of `StepControl.largest` over the wall divided by the radius, the order of the strain at buckling."""
+
+_SHORTER, _RERUNS = 0.25, 3
+"""Factor on the length of steps, and largest number of repetitions, until the first critical point is solved for."""
+
+_WAVES = 9**0.25 / 2
+"""Wave number over sqrt(R/t) up to which modes of an incompressible cylinder buckle first (Koiter 1945)."""
+
+_NO_FORCE = 1e-9
+"""Largest force, over the shear modulus times the square of the length of the body, that is round-off."""
 
 
 @dataclass(eq=False, repr=False)
@@ -42,10 +57,11 @@ class TopLoad:
     Attributes:
         path: the axisymmetric path.
         stability: stability of the states of the path, with the critical points.
-        travel: displacement of the neck in the n states, positive downwards, shape (n,), length.
-        force: force on the neck in the n states, positive downwards, shape (n,), force.
+        travel: displacement of the neck in the n states, positive towards the plate, shape (n,), length.
+        force: force on the neck in the n states, positive towards the plate, shape (n,), force.
         ended: reason why the path ended before the requested travel, or "".
         units: a `formingx.Units` for the labels.
+        up: True if the neck is above the foot and moves down, False if it is below and moves up.
     """
 
     path: Path
@@ -54,6 +70,7 @@ class TopLoad:
     force: np.ndarray
     ended: str
     units: Units = NONE
+    up: bool = True
 
     @property
     def largest_force(self) -> float:
@@ -93,10 +110,11 @@ class TopLoad:
             number: number of waves round the axis.
 
         Returns:
-            Total force, force; travel, length, positive downwards. None if no such mode buckles.
+            Total force, force; travel, length, positive towards the plate. None if no such mode buckles.
         """
         point = self.first_of(number)
-        return None if point is None else (point.state.measures["support_force"], -point.control)
+        sense = 1 if self.up else -1
+        return None if point is None else (sense * point.state.measures["support_force"], -sense * point.control)
 
     @property
     def energy(self) -> float:
@@ -105,7 +123,7 @@ class TopLoad:
         If no mode buckles, it is the work up to the state with the largest force.
         """
         first = self.first
-        end = self.travel_at_largest_force if first is None else -first.control
+        end = self.travel_at_largest_force if first is None else abs(first.control)
         last = int(np.argmax(self.travel >= end * (1 - 1e-12)))
         x, F = self.travel[: last + 1].copy(), self.force[: last + 1].copy()
         if last and x[-1] > end:
@@ -125,7 +143,9 @@ class TopLoad:
         lines = ["top load, elastic:", f"  axisymmetric path: largest force {largest}{note}"]
         for n in self.stability.numbers:
             if (found := self.buckling(n)) is not None:
-                lines.append(f"  n = {n:g}: buckles at force {pair(*found)}")
+                point = self.first_of(n)
+                lines.append(f"  n = {n:g}: buckles at force {pair(*found)}"
+                             + ", interpolated" * (point is not None and not point.solved))
         lines.append("  no mode buckles" if self.first is None else
                      f"  first: n = {self.first.number:g}; energy to it {text(self.energy, 'energy', 4)}")
         return "\n".join([*lines, f"  the path ended before: {self.ended}"] if self.ended else lines)
@@ -134,9 +154,9 @@ class TopLoad:
 
 
 def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = None,
-             modes: Iterable[float] = range(2, 9), neck: str = "neck", foot: str = "outer",
-             step: StepControl | None = None, units: Units | None = None) -> TopLoad:
-    """Press a stress-free body down onto a frictionless plate by its neck, and find its buckling loads.
+             modes: Iterable[float] | None = None, neck: str = "neck", foot: str = "outer",
+             up: bool | None = None, step: StepControl | None = None, units: Units | None = None) -> TopLoad:
+    r"""Press a stress-free body onto a frictionless plate by its neck, and find its buckling loads.
 
     The neck is constrained radially and round the axis. The plate is compliant: a traction p sinks the foot by
     p h/(2 mu), with the shear modulus mu and the depth h of the body behind the foot. For the foot `outer` of a parison
@@ -146,19 +166,25 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     Args:
         body: mesh of the body, for example `Path.deformed_mesh()`.
         material: a material, or {layer: material}, as in `Scene`.
-        travel: requested downward displacement of the neck, length. The run may end earlier, see `TopLoad.ended`.
-        floor: the plate, a `Tool`; default: a plane at the lowest node of `foot`.
-        modes: circumferential wave numbers to examine.
-        neck: name of the boundary that is pressed down.
+        travel: requested displacement of the neck, length. The run may end earlier, see `TopLoad.ended`.
+        floor: the plate, a `Tool`; default: a plane at the node of `foot` that is farthest from the neck.
+        modes: circumferential wave numbers to examine. Default: from 1 to somewhat above
+            :math:`\tfrac{1}{2} \sqrt[4]{9} \sqrt{R/t}`, with the largest ratio of radius and wall (Koiter 1945 for a
+            cylinder); more follow while the mode with the largest number buckles first.
+        neck: name of the boundary that is pressed towards the plate.
         foot: name of the boundary that stands on the plate.
-        step: control of the step length; default `StepControl(largest=0.004)`, a dimensionless arc length.
+        up: True: the neck is above the foot and moves down. False: the body stands on its head, such as a pot that was
+            formed with its base up; the plate is above it, and the neck moves up. Default: as the neck lies.
+        step: control of the step length, a dimensionless arc length; the default is shorter for thinner walls. Steps
+            are shortened, and the run is repeated, until the first critical point is solved for.
         units: a `formingx.Units`, for the labels.
 
     Returns:
         Forces, travels and critical points of the run.
 
     Raises:
-        InputError: an argument that is not allowed, or a foot that does not reach the floor.
+        InputError: an argument that is not allowed, a foot that does not reach the floor, or a force that is not above
+            round-off.
         ConvergenceError: the run failed before its second state.
 
     >>> bottle = fx.mesh.parison(inner_radius=1.0, thickness=0.03, length=2.0, elements=(12, 1))
@@ -171,20 +197,81 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
     check_name("top_load: neck", neck, body.boundaries)
     check_name("top_load: foot", foot, body.boundaries)
     travel = positive("top_load: travel", travel)
+    necks, feet = body.nodes_of(neck)[:, 1], body.nodes_of(foot)[:, 1]
+    if up is None:
+        up = bool(necks.mean() >= (feet.min() + feet.max()) / 2)
+    sense = 1 if check_type("top_load: up", up, bool, "True, False or None") else -1
     if floor is None:
-        floor = plane(float(body.nodes_of(foot)[:, 1].min())).reversed()
+        floor = plane(float(feet.min())).reversed() if up else plane(float(feet.max()))
     scene = Scene(mesh=body, materials=material,
                   supports=[*[Symmetry("axis")] * ("axis" in body.boundaries), Symmetry(neck, "r"),
                             PrescribedDisplacement(neck, "z")],
                   contacts=[Contact(foot, floor, "none", **_FOOT)])
-    modes, ended = wave_numbers(scene, modes), ""
+    slender = _slenderness(scene)
+    given, step = modes, step or StepControl(largest=min(_LARGEST_STEP, _STEP_OF_WALL / slender))
+    modes = _default_modes(scene, slender) if given is None else wave_numbers(scene, given)
+    path, ended = _press(scene, -sense * travel, step)
+    if not path["contact_length"].any():
+        raise InputError(f"top_load: floor = {floor!r}: {foot!r} does not reach it within travel = {travel:g}")
+    forms = path.problem.forms
+    if np.abs(path["support_force"]).max() <= _NO_FORCE * forms.stress * forms.length**2:
+        raise InputError(f"top_load: up = {up!r}: {neck!r} moves {'down' if up else 'up'} by {path.last.control:.4g}"
+                         f" without a force on it: the floor does not press against the body; give up={not up}, or"
+                         f" floor=...")
+    stability = path.stability(modes, "all")
+    for _ in range(_RERUNS):
+        if stability.first is None or stability.first.solved:
+            break
+        step = replace(step, largest=_SHORTER * step.largest, length=min(step.length, _SHORTER * step.largest))
+        try:
+            shorter, why = _press(scene, -sense * travel, step)
+        except ConvergenceError:
+            break
+        path, ended, stability = shorter, why, shorter.stability(modes, "all")
+    while given is None and stability.first is not None and stability.first.number >= modes[-1] - 1:
+        largest = min(int(1.5 * modes[-1]), int(max_wave_number(scene)))
+        if largest <= modes[-1]:
+            break
+        modes = [*modes, *range(int(modes[-1]) + 1, largest + 1)]
+        stability = path.stability(modes, "all")
+    return TopLoad(path, stability, -sense * path["travel"], sense * path["support_force"], ended, units or NONE, up)
+
+
+def _press(scene: Scene, travel: float, step: StepControl) -> tuple[Path, str]:
+    """Return the path of a neck that moves by `travel` (length), and the reason why it ended before, or "".
+
+    Raises:
+        ConvergenceError: the run failed before its second state.
+    """
     try:
-        path = trace(scene, until=travel_to(-travel), progress=False, step=step or StepControl(largest=_LARGEST_STEP))
+        return trace(scene, until=travel_to(travel), progress=False, step=step), ""
     except ConvergenceError as error:
         if error.path is None or len(error.path.states) < 2:
             raise
-        path, ended = error.path, str(error).split(". ")[0]
-    if not path["contact_length"].any():
-        raise InputError(f"top_load: floor = {floor!r}: {foot!r} does not reach it within travel = {travel:g}")
-    return TopLoad(path, path.stability(modes, "all"), -path["travel"], path["support_force"], ended,
-                   units or NONE)
+        return error.path, str(error).split(". ")[0]
+
+
+def _default_modes(scene: Scene, slender: float) -> list[float]:
+    """Return the wave numbers that are examined by default, for the largest ratio of radius and wall of a body."""
+    largest = min(math.ceil(1.2 * _WAVES * math.sqrt(slender)) + 2, int(max_wave_number(scene)))
+    return wave_numbers(scene, range(1, max(largest, 1) + 1))
+
+
+def _slenderness(scene: Scene) -> float:
+    """Return the largest ratio of radius and wall of a body; collective.
+
+    The wall at the middle of an edge is the distance along the inner normal to the opposite edge.
+    """
+    edges = Outline(Problem(scene).forms).reference_edges
+    a, b, middle = edges.transpose(1, 0, 2)
+    along = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
+    normal = np.column_stack([-along[:, 1], along[:, 0]])
+    # the ray middle + s normal meets the chord a + t (b - a)
+    offset, chord = a[None] - middle[:, None], b - a
+    cross = normal[:, None, 0] * chord[None, :, 1] - normal[:, None, 1] * chord[None, :, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        s = (offset[..., 0] * chord[None, :, 1] - offset[..., 1] * chord[None, :, 0]) / cross
+        t = (offset[..., 0] * normal[:, None, 1] - offset[..., 1] * normal[:, None, 0]) / cross
+    met = (s > 1e-9 * np.ptp(edges)) & (t >= -1e-9) & (t <= 1 + 1e-9)
+    wall = np.where(met, s, np.inf).min(axis=1)
+    return float(max(np.max(middle[:, 0] / wall), 1.0))
