@@ -12,7 +12,7 @@ from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
 from formingx.__main__ import main
-from formingx.contact.step_limit import StepLimit
+from formingx.extensions.space.lagged_corrections import LaggedCorrections
 from formingx.extensions.space.part import _positive_share
 from formingx.io.stl import write_stl
 from formingx.problem.problem import Problem
@@ -417,7 +417,7 @@ def test_a_target_whose_second_solution_fails_keeps_the_first(monkeypatch):
     def run():
         path = fx.trace(trough(0.1, friction="none"), until=fx.pressure(0.3), progress=False)
         return path.wall().ratio
-    renewed, renew, solve, fails = run(), StepLimit.renew_pressure, Curve.solve_again, []
+    renewed, renew, solve, fails = run(), LaggedCorrections.renew, Curve.solve_again, []
 
     def remember(limit, new):
         fails[:] = [1] if (found := renew(limit, new)) else []
@@ -428,10 +428,10 @@ def test_a_target_whose_second_solution_fails_keeps_the_first(monkeypatch):
             fails.clear()
             raise Failure("on purpose", [])
         return solve(*args)
-    monkeypatch.setattr(StepLimit, "renew_pressure", remember)
+    monkeypatch.setattr(LaggedCorrections, "renew", remember)
     monkeypatch.setattr(Curve, "solve_again", failing)
     kept = run()
-    monkeypatch.setattr(StepLimit, "renew_pressure", lambda limit, new: False)
+    monkeypatch.setattr(LaggedCorrections, "renew", lambda limit, new: False)
     np.testing.assert_array_equal(kept, run())
     assert np.abs(kept / renewed - 1).max() > 0.02
 

@@ -1,13 +1,13 @@
 """Contact of one face during a step: prediction of gap closures, and checks for steps that are too long.
 
 A gap is closed where the signed distance of a point from its tool exceeds -theta, the outer edge of the ramp of the
-contact law. Contact with tools in three dimensions is lagged: the closed points, and the pressure that limits their
-friction, belong to the last accepted state.
+contact law. An extension may derive from `Approach` for tools of its own (`formingx.extensions.space.lagged_steps`).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
@@ -21,9 +21,6 @@ from .gap_closures import gap_closures
 class StepLimits:
     """Limits that contact sets to a step.
 
-    Contact with tools in three dimensions is lagged: the closed points, and the pressure that bounds their friction,
-    belong to the last accepted state.
-
     Attributes:
         start_fraction: fraction of a step; gaps that close earlier in the step count as closed at its start.
         overshoot: length of a step that ends at a gap closure, over the arc length to the closure.
@@ -31,22 +28,8 @@ class StepLimits:
         friction_fraction: fraction of a step. If the gap of a sticking point closes in the rest of the step, friction
             acts on the point from the next step on only.
         max_slip_ratio: largest slip of a sticking point after its gap closure in a step, over its tributary length.
-        max_approach_ratio: largest motion of a point in a step of lagged contact, less its tributary length, over its
-            gap.
         max_cut_ratio: largest depth of the straight path of a point inside a tool, over its tributary length.
         max_positions: largest number of positions at which this path is checked.
-        max_pressure_change: largest predicted change of the pressure in a step of lagged friction, over the pressure.
-        max_pressure_difference: allowed difference between the pressure at the end of the step and the pressure that
-            bounds friction, over the pressure.
-        max_corrections: largest number of repeated solutions of a step that reduce this difference.
-        max_target_difference: allowed difference between the contact pressure of a state at a target and the pressure
-            with which it was solved, over the pressure.
-        rejection_ratio: multiple of `max_pressure_change`; a solved step with a larger change of the pressure is
-            rejected.
-        settling_iterations: number of Newton iterations that lagged friction needs in a step, however short the step
-            is.
-        min_force: normal force, over shear modulus times thickness times length, that is added to the denominator of
-            relative changes of the pressure: lightly loaded contacts do not limit the step.
         min_length: arc length (dimensionless) below which a step is rejected neither for a change of the pressure nor
             for the slip of a point after its gap closure.
         min_mixed_length: arc length (dimensionless) below which sticking points may lift off while the gaps of others
@@ -58,21 +41,25 @@ class StepLimits:
     negligible_gap: float = 1e-3
     friction_fraction: float = 0.95
     max_slip_ratio: float = 2e-3
-    max_approach_ratio: float = 0.7
     max_cut_ratio: float = 0.5
     max_positions: int = 4000
-    max_pressure_change: float = 0.2
-    max_pressure_difference: float = 5e-3
-    max_corrections: int = 3
-    max_target_difference: float = 1e-4
-    rejection_ratio: float = 1.4
-    settling_iterations: int = 2
-    min_force: float = 1e-2
     min_length: float = 1e-4
     min_mixed_length: float = 5e-4
 
 
 LIMITS = StepLimits()
+
+
+class StepRejection(NamedTuple):
+    """Rejection of a step that is too long.
+
+    Attributes:
+        reason: the reason, as text for the log.
+        fraction: admissible fraction of the step length; 0 if unknown.
+    """
+
+    reason: str
+    fraction: float = 0.0
 
 
 class Approach:
@@ -93,8 +80,7 @@ class Approach:
     def __init__(self, face: FaceContact, conducts: bool):
         self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
         self.points = combined(face.comm, len(face.rule.points))
-        share = max(self.points // 100, 1) if face.contact.lagged else 1
-        self.max_closures = (given or 1) * share * (1 if face.law.has_history or conducts else 10)
+        self.max_closures = (given or 1) * (1 if face.law.has_history or conducts else 10)
         self._predicted_closures = 0                        # number in the step, on all ranks
         self._bonded_from: np.ndarray = np.ones(len(face.rule.points))      # fraction of the step; 1: not in the step
 
@@ -116,8 +102,7 @@ class Approach:
 
         The step ends where `max_closures` new points have come into contact. If at most one point was in contact
         before, it ends at the first gap closure. If a whole region came into contact in one step, its sticking
-        positions would depend on the step length. In lagged contact the motion of the points and the change of the
-        pressure are limited too.
+        positions would depend on the step length.
 
         Args:
             fields: locally owned unknowns of the state, shape (n,).
@@ -132,18 +117,20 @@ class Approach:
         face = self.face
         start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
         free = ~face.law.touching(start, face.history)
-        if face.contact.lagged:                             # a tangent of a long step predicts no gap closures
-            most = LIMITS.max_approach_ratio * np.maximum(-face.law.distance(start), 0.0) + face.rule.lengths
-            speed = np.linalg.norm(velocity, axis=1)
-            most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
-            length = combined(self._comm, float(most.min(initial=length)), MPI.MIN)
-            length = self._within_pressure_change(start, velocity, length)
+        length = self._within_motion(start, velocity, free, length)
         arc_lengths = gap_closures(face.law, start, velocity, free, length)
         ahead = (arc_lengths > LIMITS.start_fraction * length) & (arc_lengths < length)
         arc_lengths = np.sort(gathered(self._comm, arc_lengths[ahead]))
         touching = combined(self._comm, int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
         allowed = self.max_closures if touching > 1 else 1
         return min(LIMITS.overshoot * arc_lengths[allowed - 1], length) if len(arc_lengths) >= allowed else length
+
+    def _within_motion(self, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> float:
+        """Return the arc length, at most `length`, within which a tangent predicts gap closures; by default `length`.
+
+        start, velocity: positions of the points and their derivatives by arc length. free: mask of the open points.
+        """
+        return length
 
     def closures(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
                  length: float) -> tuple[np.ndarray, np.ndarray]:
@@ -185,22 +172,53 @@ class Approach:
         self._predicted_closures = combined(self._comm, int(np.sum(arc_lengths < length)), MPI.SUM)
         if face.law.adhesive:
             self._bonded_from = np.where(False if guessed is None else guessed, arc_lengths / length, 1.0)
-        if not face.contact.lagged:                         # lagged friction needs positions for its pressure only
-            at_end = ends & face.contact.sticks & (arc_lengths >= LIMITS.friction_fraction * length)
-            if speeds is not None and at_end.any():
-                tangent = face.law.part(np.flatnonzero(at_end)).nearest(places[at_end]).tangent
-                slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - arc_lengths[at_end])
-                at_end[at_end] = slip <= LIMITS.max_slip_ratio * face.rule.lengths[at_end]
-            face.set_closures(np.where(at_end[:, None], np.nan, places), guessed)
-        elif ends and self.has_lagged_friction:
-            face.set_closures(places)
+        at_end = ends & face.contact.sticks & (arc_lengths >= LIMITS.friction_fraction * length)
+        if speeds is not None and at_end.any():
+            tangent = face.law.part(np.flatnonzero(at_end)).nearest(places[at_end]).tangent
+            slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - arc_lengths[at_end])
+            at_end[at_end] = slip <= LIMITS.max_slip_ratio * face.rule.lengths[at_end]
+        face.set_closures(np.where(at_end[:, None], np.nan, places), guessed)
+
+    settling = 0
+    """Number of Newton iterations that contact needs in a step of any length; the step control does not count them."""
+
+    def prepares(self, ends: bool) -> bool:
+        """Return True if `prepare` uses predicted gap closures; ends: True if `rejection` may shorten the step."""
+        return True
+
+    def rejection(self, old: Any, new: Any, n: int, length: float, ends: bool) -> StepRejection | None:
+        """Return the rejection of a solved step that is too long for this contact, or None.
+
+        Args:
+            old: accepted state at the start of the step.
+            new: converged state at its end.
+            n: number of locally owned unknowns of the fields.
+            length: arc length of the step.
+            ends: True to also reject a step after whose gap closure a point slips wrongly. A sticking point then slips
+                too far without friction, or a sliding point slides against its slip since the closure. The repeated
+                step ends at this gap closure.
+        """
+        x, control = new.x[:n], new.control
+        if self.has_too_many_closures(old.x[:n], old.control, x, control):
+            return StepRejection("too many points came into contact in one step")
+        if self.passes_through(old.x[:n], old.control, x, control):
+            return StepRejection("a tool would pass through the face that it touches")
+        if length > LIMITS.min_mixed_length and self.opens_and_closes(x, control):
+            return StepRejection("points lift off while others come into contact", 0.5)
+        if ends and length > LIMITS.min_length:
+            part = self.fraction_to_lost_bond(x, control)
+            if part < 1:
+                return StepRejection("gap closure", min(LIMITS.overshoot * part, 1.0))
+            part = self.fraction_to_wrong_slip(x, control, new.direction[:n], new.slope, length)
+            if part < 1:
+                return StepRejection("gap closure", part)
+        return None
 
     def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """Return True if too many points came into contact in a step.
 
         The limit is 2 plus twice the larger of `max_closures`, allowed in a step, and the number of predicted gap
-        closures. In lagged contact, whose friction uses the last pressure, depth counts: a new point must not be
-        deeper in the tool than twice its tributary length. Contacts without history variables have no limit.
+        closures. Contacts without history variables have no limit.
 
         Args:
             old: locally owned unknowns at the start of the step, shape (n,).
@@ -215,115 +233,8 @@ class Approach:
         if face.history is None:
             return False
         a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
-        if face.contact.lagged:
-            deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
-            return bool(combined(self._comm, float(deep.max(initial=0.0)), MPI.MAX) > 0)
         found = int(np.sum((a <= -theta - LIMITS.negligible_gap * face.thickness) & (b > -theta)))
         return bool(combined(self._comm, found, MPI.SUM) > 2 * max(self.max_closures, self._predicted_closures) + 2)
-
-    @property
-    def has_lagged_friction(self) -> bool:
-        """True if friction is lagged: the pressure of the last accepted state bounds the friction in the step."""
-        return bool(self.face.contact.lagged and 0 < self.face.law.mu < np.inf)
-
-    def change_of_pressure(self, new: np.ndarray, control: float) -> float:
-        """Return the relative change of the contact pressure in a step with lagged friction.
-
-        Args:
-            new: locally owned unknowns at the end of the step, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            Change of the pressure since the last accepted state over the pressure there; 0 without lagged friction.
-        """
-        return self._pressure_difference(self.face.tractions(new, control).normal) if self.has_lagged_friction else 0.0
-
-    def update_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Replace the pressure that bounds lagged friction by the pressure at the end of the step.
-
-        Args:
-            new: locally owned unknowns at the end of the step, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            True if the pressure was updated. False if both pressures agree to `StepLimits.max_pressure_difference`, or
-            friction is not lagged.
-        """
-        if not self.has_lagged_friction:
-            return False
-        face, law = self.face, self.face.law
-        now = face.tractions(new, control).normal
-        if self._pressure_difference(now, law.friction_pressure(face.history)) <= LIMITS.max_pressure_difference:
-            return False
-        face.set_closures(law.closure_at_pressure(face.history, now))
-        return True
-
-    def renew_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Replace the contact pressure stored at the last accepted state by the pressure of a state at a target.
-
-        On tools in three dimensions the stored pressure bounds the friction of a step. Where a sheet slides, the
-        tangential part of a fluid pressure also decreases with the stored pressure.
-
-        Args:
-            new: locally owned unknowns of the state, which meets a target of the run, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-
-        Returns:
-            True if the pressure was replaced. False if both agree to `StepLimits.max_target_difference` in the
-            area-weighted 1-norm, or if no pressure is stored for friction.
-        """
-        face, law, variables = self.face, self.face.law, self.face.get()
-        if variables is None or not face.contact.lagged or face.contact.sticks:
-            return False
-        old, depth = variables.history, np.maximum(law.distance(face.positions(new, control)), 0.0)
-        history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), closure=old.position)
-        now = law.pressure(history)
-        sums = np.array([face.rule.area @ np.abs(now - law.friction_pressure(old)), face.rule.area @ now])
-        change, pressure = combined(self._comm, sums, MPI.SUM)
-        if change <= LIMITS.max_target_difference * (pressure + LIMITS.min_force * face.force_scale):
-            return False
-        face.put(variables._replace(history=history))
-        return True
-
-    def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """Return the arc length after which the contact pressure has changed by a given fraction.
-
-        The fraction is `StepLimits.max_pressure_change`. The pressure is extrapolated linearly from the last accepted
-        state. Lagged friction is bounded by the pressure at that state.
-
-        Args:
-            start: positions of the points relative to the tool, shape (n, c), length.
-            velocity: their derivatives by arc length, shape (n, c), length.
-            length: largest arc length.
-
-        Returns:
-            Arc length, at most `length`; `length` without lagged friction.
-        """
-        if not self.has_lagged_friction:
-            return length
-        law, history = self.face.law, self.face.history
-        rate = law.k * np.einsum("ni,ni->n", law.motion(start, history).normal, velocity)
-        change = self._pressure_difference(law.pressure(history) + length * rate)
-        return length * min(LIMITS.max_pressure_change / change, 1.0) if change else length
-
-    def _pressure_difference(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
-        """Return the relative difference between two pressure fields in the area-weighted 1-norm.
-
-        The difference is summed over the points that were under pressure at the last accepted state. It is divided by
-        the total normal force at that state plus a small force (`StepLimits.min_force`).
-
-        Args:
-            normal: normal tractions, shape (n,), stress; tension counts as 0.
-            other: pressure to compare with, shape (n,), stress; None: the pressure at the last accepted state.
-
-        Returns:
-            Relative difference over all ranks.
-        """
-        face, before = self.face, self.face.law.pressure(self.face.history)
-        difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
-        sums = np.array([face.rule.area @ np.where(before > 0, difference, 0.0), face.rule.area @ before])
-        change, pressure = combined(self._comm, sums, MPI.SUM)
-        return float(change / (pressure + LIMITS.min_force * face.force_scale))
 
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
         """Return True if sticking points lifted off and moved back along the tool while other gaps closed.
@@ -338,7 +249,7 @@ class Approach:
             True if both happened in the step, on any ranks.
         """
         face, theta, history = self.face, self.face.law.theta, self.face.history
-        if history is None or not face.contact.sticks or face.law.adhesive or face.contact.lagged:
+        if history is None or not face.contact.sticks or face.law.adhesive:
             return False
         x, area = face.positions(new, control), face.rule.area > 0
         near = face.law.nearest(x)

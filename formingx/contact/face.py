@@ -359,39 +359,6 @@ class FaceContact:
             newly_closed |= self._stored.newly_closed & (moved < 1e-12 * self._length)
         self._set_history(FaceHistory(history, newly_closed, penalty))
 
-    def separate(self, fields: np.ndarray, control: float) -> bool:
-        """Open the points under tension at a tool in three dimensions; return True if there are any. Collective.
-
-        fields, control: locally owned unknowns and load parameter of the state.
-        """
-        if self._stored is None or not (self.contact.lagged and self.contact.separates):
-            return False
-        history, x = self._stored.history, self.positions(fields, control)
-        free = self.law.in_tension(x, history) & ~self._stored.newly_closed
-        found = bool(self.comm.allreduce(int(free.sum())))
-        if found:
-            self._set_history(self._stored._replace(history=history._replace(
-                position=np.where(free[:, None], x, history.position),
-                distance=np.where(free, -2 * self.law.theta, history.distance))))
-        return found
-
-    def close_penetrated(self, fields: np.ndarray, control: float, most: float) -> bool:
-        """Close the gaps of open points that are deeper than `most` (length) in a tool in three dimensions; collective.
-
-        Each such point sticks or slides from the position where its path in the step met the tool. Return True if
-        there are such points. fields, control: locally owned unknowns and load parameter of the state.
-        """
-        if self._stored is None or not self.contact.lagged:
-            return False
-        old, x, theta = self._stored.history, self.positions(fields, control), self.law.theta
-        late = (old.distance <= -theta) & (self.law.distance(x) > most)
-        found = bool(self.comm.allreduce(int(late.sum())))
-        if found:
-            new = self.law.tractions(x, old).history
-            self._set_history(self._stored._replace(history=ContactHistory(*(
-                np.where(late if a.ndim == 1 else late[:, None], b, a) for a, b in zip(old, new)))))
-        return found
-
     @property
     def force_scale(self) -> float:
         """Magnitude of the forces in the body: shear modulus times thickness times largest extent of the body."""

@@ -11,7 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 import numpy as np
 
 from ..forms.history import Start
-from .approach import LIMITS, Approach
+from .approach import Approach, StepRejection
 
 
 class EventPrediction(Protocol):
@@ -127,18 +127,6 @@ class TrialStep(NamedTuple):
     events: EventPrediction | None = None
 
 
-class StepRejection(NamedTuple):
-    """Rejection of a step that is too long.
-
-    Attributes:
-        reason: the reason, as text for the log.
-        fraction: admissible fraction of the step length; 0 if unknown.
-    """
-
-    reason: str
-    fraction: float = 0.0
-
-
 class StepLimit:
     """Limits the length of a step so that contacts do not change too much.
 
@@ -154,7 +142,8 @@ class StepLimit:
 
     def __init__(self, problem: Any):
         self._n, heat = problem.n_owned, problem.scene.heat
-        self._all = [Approach(face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
+        self._all = [getattr(face.contact.tool, "approach", Approach)(
+            face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
         self.several_closures = not problem.scene.one_node_per_step
         make = type(self).make_predictor
         self._predictor = make(self) if make else None
@@ -233,8 +222,8 @@ class StepLimit:
         """
         n, found = self._n, trial.events.closures(trial.length) if trial.events else None
         for k, approach in enumerate(self.active_contacts):
-            if approach.face.contact.lagged and not (ends and approach.has_lagged_friction):
-                continue                                    # such a contact uses no predicted gap closures
+            if not approach.prepares(ends):
+                continue
             arc_lengths, places, *predicted = found[k] if found else approach.closures(
                 trial.x[:n], trial.control, trial.direction[:n], trial.slope, trial.length)
             approach.prepare(arc_lengths, places, trial.length, ends, *predicted)
@@ -254,78 +243,23 @@ class StepLimit:
         Returns:
             Reason and admissible fraction of the step; None if the step is accepted.
         """
-        n, contacts = self._n, self.active_contacts
-        if any([c.has_too_many_closures(old.x[:n], old.control, new.x[:n], new.control) for c in contacts]):
-            return StepRejection("too many points came into contact in one step")
-        if self.passes_through(old, new):
-            return StepRejection("a tool would pass through the face that it touches")
-        change = max([c.change_of_pressure(new.x[:n], new.control) for c in contacts], default=0.0)
-        if change > LIMITS.rejection_ratio * LIMITS.max_pressure_change and length > LIMITS.min_length:
-            return StepRejection("the pressure that limits friction changes", LIMITS.max_pressure_change / change)
-        if length > LIMITS.min_mixed_length and any([c.opens_and_closes(new.x[:n], new.control) for c in contacts]):
-            return StepRejection("points lift off while others come into contact", 0.5)
-        if ends and length > LIMITS.min_length:
-            part = min([c.fraction_to_lost_bond(new.x[:n], new.control) for c in contacts], default=1.0)
-            if part < 1:
-                return StepRejection("gap closure", min(LIMITS.overshoot * part, 1.0))
-            part = min([c.fraction_to_wrong_slip(new.x[:n], new.control, new.direction[:n], new.slope, length)
-                        for c in contacts], default=1.0)
-            if part < 1:
-                return StepRejection("gap closure", part)
-        return None
+        found = [c.rejection(old, new, self._n, length, ends) for c in self.active_contacts]
+        return min(filter(None, found), key=lambda rejection: rejection.fraction, default=None)
 
     @property
     def settling(self) -> int:
-        """Number of Newton iterations that lagged friction needs in a step, however short; 0 without lagged friction.
+        """Number of Newton iterations of a step of any length that the step control does not count."""
+        return max((c.settling for c in self.active_contacts), default=0)
 
-        The step control does not count them. Friction is lagged on tools in three dimensions.
+    @property
+    def corrections(self) -> Any | None:
+        """Corrections of a solved step by contacts that open and close points between steps only; None without them.
+
+        The tool of such a contact names their class (`formingx.extensions.space.lagged_corrections`).
         """
-        return LIMITS.settling_iterations if any(c.has_lagged_friction for c in self.active_contacts) else 0
-
-    def separate(self, new: Any) -> bool:
-        """Open the contact points under tension at tools in three dimensions, at a converged state.
-
-        Args:
-            new: the converged state.
-
-        Returns:
-            True if a point separated, so that the state must be solved for again.
-        """
-        return any([c.face.separate(new.x[: self._n], new.control) for c in self.active_contacts])
-
-    def close_penetrated(self, new: Any, at_target: bool, sweep: int) -> bool:
-        """Close the contact of points that penetrated a tool in three dimensions during a step, at its converged state.
-
-        At a target this applies to all tools, otherwise only to tools with friction. The contact pressure of this state
-        then bounds the friction of all points, in place of the pressure of the last accepted state.
-
-        Args:
-            new: the converged state.
-            at_target: True if the state meets a target of the run.
-            sweep: number of earlier calls for this step.
-
-        Returns:
-            True if a contact status, or the pressure that bounds friction, changed. The state must then be solved for
-            again.
-        """
-        n, again = self._n, sweep < LIMITS.max_corrections
-        late = [c.face.close_penetrated(new.x[:n], new.control, LIMITS.negligible_gap * c.face.thickness)
-                for c in self.active_contacts if at_target or c.has_lagged_friction]
-        return any([*late, *(c.update_pressure(new.x[:n], new.control) for c in self.active_contacts if again)])
-
-    def renew_pressure(self, new: Any) -> bool:
-        """Replace lagged contact pressures by the pressures of a state at a target, and open points in tension.
-
-        The solution with the new pressures depends less on the steps before the target.
-
-        Args:
-            new: the converged state.
-
-        Returns:
-            True if a pressure or a contact status changed, so that the state must be solved for again.
-        """
-        contacts = self.active_contacts
-        return self.separate(new) or any([c.renew_pressure(new.x[: self._n], new.control) for c in contacts])
+        found = [(c, c.face.contact.tool.corrections) for c in self.active_contacts
+                 if hasattr(c.face.contact.tool, "corrections")]
+        return found[0][1]([c for c, _ in found], self._n) if found else None
 
     def passes_through(self, old: Any, new: Any) -> bool:
         """Return True if a contact point passes through its tool between two states.

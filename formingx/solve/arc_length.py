@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
@@ -12,7 +12,7 @@ from petsc4py import PETSc
 from ..errors import ConvergenceError
 from ..measures.targets import Target
 from .equations import Array, Constraint, Quantity
-from .newton import Failure, fixed
+from .newton import Failure
 from .state import State
 from .state_solver import StateSolver
 
@@ -32,13 +32,7 @@ class Curve(StateSolver):
     Args:
         problem: the equations.
         tolerances: convergence criteria of a state.
-
-    Attributes:
-        sweeps: largest number of solutions of one step with tools in three dimensions. After each solution, points that
-            penetrate are put into contact, or points in tension separate.
     """
-
-    sweeps = 30
 
     def plane_normal(self, state: State) -> Array:
         """Return the normal of the plane in which a step from a state ends, as the gradient of its constraint.
@@ -279,48 +273,6 @@ class Curve(StateSolver):
                 break
             a, b = (found, b) if found.slope * a.slope > 0 else (a, found)
         return found
-
-    def close_penetrated(self, old: State, states: list[State],
-                         targets: Sequence[tuple[Target, Quantity]]) -> list[State]:
-        """Put points that penetrate tools in three dimensions into contact, and solve again for the end of a step.
-
-        A point closes at the position where it met the tool.
-
-        * A state that meets a target meets it again afterwards. The points of all tools are considered, and contact
-          pressures are renewed (`StepLimit.renew_pressure`). Without friction this state then does not depend on the
-          steps before it. If the solution with renewed pressures fails, the solution before it is returned.
-        * A state that meets no target is solved for again at the same control. Only the points of tools with friction
-          are considered.
-
-        Args:
-            old: accepted state at the start of the step.
-            states: states found by the step, in order; only the first one is solved for again.
-            targets: pairs (open target, its output quantity).
-
-        Returns:
-            All states of the step, in order. In the first one no point penetrates a tool.
-
-        Raises:
-            Failure: no such state was found.
-        """
-        limit, (new, *rest) = self.problem.limit, states
-        quantity = next((quantity for target, quantity in targets if target is new.target), None)
-        if limit is None or new.kind == "limit point":
-            return states
-        equation = fixed(new.control) if quantity is None or new.target is None else quantity.equation(new.target.value)
-        for sweep in range(self.sweeps):
-            late, variables = limit.close_penetrated(new, quantity is not None, sweep), self.problem.history_variables
-            if not late and (quantity is None or sweep > self.sweeps / 2 or not limit.renew_pressure(new)):
-                return [new, *rest]
-            try:
-                new = self.solve_again(new, equation, old)
-            except Failure as failure:
-                if late:
-                    raise
-                log.info("the contact pressure at %s stays that of the last solution: %s", new.target, failure.reason)
-                self.problem.history_variables = variables
-                return [new, *rest]
-        raise Failure("points that come into contact late bring others into their tool again and again", [])
 
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
         """Return the constraint of the plane through (x0, control0) that is normal to the tangent of the state `old`.

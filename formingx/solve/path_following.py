@@ -26,7 +26,7 @@ from .jump_rules import JumpRules, at_limit_points, snaps
 from .newton import Failure, fixed, tangents
 from .progress import Progress, RunTargets
 from .record import InadmissibleState, Record
-from .snap_through import SnapThrough, separate_points, was_passed
+from .snap_through import SnapThrough, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
 
@@ -286,7 +286,8 @@ class Run:
         self._orientation.check(old, new)
         error, variables = self._error_in_time(new), self.problem.history_variables
         try:
-            new = separate_points(self.curve, limit, old, new, lambda state: self._jump(state, 0.0)) if limit else new
+            if limit and limit.corrections:
+                new = limit.corrections.separate(self.curve, old, new, lambda state: self._jump(state, 0.0))
             states, self._jumps.change = self._states_within(old, new), self.settings.snap_through.control_change
         except Failure:
             self.problem.history_variables = variables
@@ -350,7 +351,7 @@ class Run:
         new = self._jumps.jump(old, length, self._sense, self.states,
                                lambda: self._progress.limited("a jump", self.step.length), work_sign)
         new = replace(new, target=self.targets.reached_target(new))
-        new = self.curve.close_penetrated(old, [new], self.targets.open)[0]
+        new = self._corrected(old, new)
         self.step.length = max(self.step.length, step / 2)
         log.info("a jump: %s", new.jump)
         return new
@@ -395,7 +396,20 @@ class Run:
                 state.target = target
                 found.append(state)
         found.sort(key=lambda state: self.curve.progress(old, state))
-        return self.curve.close_penetrated(old, [*found, new], self.targets.open)
+        first, *rest = [*found, new]
+        return [self._corrected(old, first), *rest]
+
+    def _corrected(self, old: State, new: State) -> State:
+        """Return the state `new` of a step from `old` after contact has come to rest; may raise `Failure`.
+
+        Contacts in three dimensions open and close points between steps only.
+        """
+        corrections = self.problem.limit and self.problem.limit.corrections
+        if not corrections or new.kind == "limit point":
+            return new
+        equation = next((quantity.equation(target.value) for target, quantity in self.targets.open
+                         if target is new.target), None)
+        return corrections.close_penetrated(self.curve, old, new, equation)
 
     def _accept(self, state: State) -> None:
         """Accept a state and close the targets that it meets."""

@@ -390,29 +390,3 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
             if curve.distance(new, replace(new, x=x, control=control)) < near:
                 return True
     return False
-
-
-def separate_points(curve: Curve, limit: StepLimit, old: State, new: State, jump: Callable[[State], State]) -> State:
-    """Separate the contact points in tension from tools in three dimensions, and solve again at the same control.
-
-    Args:
-        curve: solver of the path.
-        limit: limits of a step by contact.
-        old: the state from which the step started.
-        new: the state found by the step.
-        jump: function that returns the state after a snap-through from a given state, if the body snaps off its tool.
-
-    Returns:
-        The state, without contact points in tension.
-
-    Raises:
-        Failure: no such state was found.
-    """
-    for _ in range(curve.sweeps):
-        if not limit.separate(new):
-            return new
-        try:
-            new = curve.solve_again(new, fixed(new.control), old)
-        except Failure:
-            new = jump(new)
-    raise Failure("points that separate from a tool touch it again and again", [])

@@ -12,9 +12,9 @@ g_s.
 
 The pressure N_0 is constant during the Newton iterations of a step, which therefore converge. At first N_0 is the
 pressure at the last accepted state, extrapolated along the tangent of the path. Then the step is solved again with the
-pressure that was found, until both agree (`StepLimits.max_pressure_difference`). N_0 is 0 for a point whose gap has
+pressure that was found, until both agree (`LaggedLimits.max_pressure_difference`). N_0 is 0 for a point whose gap has
 closed since the last accepted state. Steps are short, so that the pressure changes little in each of them
-(`StepLimits.max_pressure_change`).
+(`LaggedLimits.max_pressure_change`).
 
 Within a step a point in contact carries tension as well as pressure, so that Newton's method meets no kink. Points in
 tension separate at the end of the step.

@@ -11,7 +11,7 @@ acts. The tangential part fades as the contact pressure grows, so the force is c
 
 Within a step the contact pressure is constant: as a function of the displacement it would keep Newton's method from
 converging on coarse fillets. It is the pressure of the last accepted state, and 0 at nodes whose gap closed since then.
-At a target the state is solved for again with its own contact pressure, until both agree (`StepLimit.renew_pressure`).
+At a target the state is solved for again with its own contact pressure, until both agree (`LaggedCorrections.renew`).
 States at targets, and states of `Path.state_at`, therefore do not depend on the steps before them without friction.
 """
 

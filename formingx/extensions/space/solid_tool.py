@@ -17,7 +17,9 @@ from ...physics.contact_law import ContactLaw
 from ...tools.profile import Tool
 from ...values.tolerances import ROUND_OFF
 from .bodies import merged
+from .lagged_corrections import LaggedCorrections
 from .lagged_friction import Distances, LaggedFriction
+from .lagged_steps import LaggedApproach
 from .lagged_stick import LaggedStick
 
 _CORNER_PIECES = 24           # straight pieces of a rounded corner in `surface`
@@ -31,11 +33,15 @@ class SolidTool:
     Attributes:
         components: number of coordinates, 3.
         sized: True if the surface is bounded; False for a plane, whose `bounds` have no meaning.
+        approach: class of the limits of a step with this tool.
+        corrections: class of the corrections of a solved step.
         shift: displacement (x, y, z) from the initial position, length, see `moved`.
     """
 
     components = 3
     sized = True
+    approach = LaggedApproach
+    corrections = LaggedCorrections
     shift: tuple[float, ...] = (0.0, 0.0, 0.0)
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:

@@ -1,0 +1,100 @@
+"""Corrections of a solved step with lagged contact, whose points open and close between steps only.
+
+After a correction the state is solved for again, until no point opens or closes.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+
+from ...solve.arc_length import Curve
+from ...solve.equations import Constraint
+from ...solve.newton import Failure, fixed
+from ...solve.state import State
+from .lagged_steps import LAGGED, LaggedApproach
+
+log = logging.getLogger("formingx")
+
+
+class LaggedCorrections:
+    """Corrections of a solved step, for all faces with lagged contact.
+
+    Args:
+        contacts: the `LaggedApproach` of each face.
+        n: number of locally owned unknowns of the fields.
+    """
+
+    def __init__(self, contacts: list[LaggedApproach], n: int):
+        self._contacts, self._n = contacts, n
+
+    def _separates(self, new: State) -> bool:
+        """Open the points in tension at a converged state; return True if there are any."""
+        return any([c.separate(new.x[:self._n], new.control) for c in self._contacts])
+
+    def separate(self, curve: Curve, old: State, new: State, jump: Callable[[State], State]) -> State:
+        """Separate the points in tension from their tools, and solve again at the same control.
+
+        Args:
+            curve: solver of the path.
+            old: accepted state at the start of the step.
+            new: solved state at its end.
+            jump: function that returns the state after a snap-through from a given state, if the body snaps off its
+                tool.
+
+        Returns:
+            The state, without points in tension.
+
+        Raises:
+            Failure: no such state was found.
+        """
+        for _ in range(LAGGED.max_solutions):
+            if not self._separates(new):
+                return new
+            try:
+                new = curve.solve_again(new, fixed(new.control), old)
+            except Failure:
+                new = jump(new)
+        raise Failure("points that separate from a tool touch it again and again", [])
+
+    def close_penetrated(self, curve: Curve, old: State, new: State, equation: Constraint | None) -> State:
+        """Put points that penetrate a tool into contact where they met it, and solve again for the end of a step.
+
+        At a target the points of all tools are considered, and contact pressures are renewed, so that without friction
+        the state does not depend on the steps before it. If the solution with renewed pressures fails, the solution
+        before it is returned. At other states only the points of tools with friction are considered.
+
+        Args:
+            curve: solver of the path.
+            old: accepted state at the start of the step.
+            new: solved state at its end.
+            equation: constraint of the target that `new` meets; None if it meets none. The control then stays.
+
+        Returns:
+            The state, in which no point penetrates a tool.
+
+        Raises:
+            Failure: no such state was found.
+        """
+        constraint = equation or fixed(new.control)
+        for sweep in range(LAGGED.max_solutions):
+            late = any([c.correct(new.x[:self._n], new.control, equation is not None, sweep) for c in self._contacts])
+            variables = curve.problem.history_variables
+            if not late and (equation is None or sweep > LAGGED.max_solutions / 2 or not self.renew(new)):
+                return new
+            try:
+                new = curve.solve_again(new, constraint, old)
+            except Failure as failure:
+                if late:
+                    raise
+                log.info("the contact pressure at %s stays that of the last solution: %s", new.target, failure.reason)
+                curve.problem.history_variables = variables
+                return new
+        raise Failure("points that come into contact late bring others into their tool again and again", [])
+
+    def renew(self, new: State) -> bool:
+        """Open points in tension, and replace stored contact pressures by those of a state at a target.
+
+        Return True if the state must be solved for again.
+        """
+        return self._separates(new) or any([c.renew_pressure(new.x[:self._n], new.control) for c in self._contacts])

@@ -1,0 +1,263 @@
+"""Limits of a step, and corrections after its solution, for contact with tools in three dimensions.
+
+Contact with these tools is lagged: the closed points, and the pressure that bounds their friction, belong to the last
+accepted state.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from mpi4py import MPI
+
+from ...contact.approach import LIMITS, Approach, StepRejection
+from ...contact.face import FaceContact
+from ...physics.contact_law import ContactHistory
+from ...ranks import combined
+
+
+@dataclass(frozen=True)
+class LaggedLimits:
+    """Limits of a step with lagged contact.
+
+    Attributes:
+        max_approach_ratio: largest motion of a point in a step of lagged contact, less its tributary length, over its
+            gap.
+        max_pressure_change: largest predicted change of the pressure in a step of lagged friction, over the pressure.
+        max_pressure_difference: allowed difference between the pressure at the end of the step and the pressure that
+            bounds friction, over the pressure.
+        max_corrections: largest number of repeated solutions of a step that reduce this difference.
+        max_target_difference: allowed difference between the contact pressure of a state at a target and the pressure
+            with which it was solved, over the pressure.
+        rejection_ratio: multiple of `max_pressure_change`; a solved step with a larger change of the pressure is
+            rejected.
+        settling_iterations: number of Newton iterations that lagged friction needs in a step, however short the step
+            is.
+        max_solutions: largest number of solutions of a step. After each of them points separate or come into contact.
+        min_force: normal force, over shear modulus times thickness times length, that is added to the denominator of
+            relative changes of the pressure: lightly loaded contacts do not limit the step.
+    """
+
+    max_approach_ratio: float = 0.7
+    max_pressure_change: float = 0.2
+    max_pressure_difference: float = 5e-3
+    max_corrections: int = 3
+    max_target_difference: float = 1e-4
+    rejection_ratio: float = 1.4
+    settling_iterations: int = 2
+    max_solutions: int = 30
+    min_force: float = 1e-2
+
+
+LAGGED = LaggedLimits()
+
+
+class LaggedApproach(Approach):
+    """Lagged contact of one face during a step, see `formingx.contact.approach.Approach`.
+
+    Args:
+        face: the contact.
+        conducts: True if heat flows through points in contact, from the end of the step on.
+    """
+
+    def __init__(self, face: FaceContact, conducts: bool):
+        super().__init__(face, conducts)
+        self.max_closures *= max(self.points // 100, 1)
+
+    def _within_motion(self, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> float:
+        most = LAGGED.max_approach_ratio * np.maximum(-self.face.law.distance(start), 0.0) + self.face.rule.lengths
+        speed = np.linalg.norm(velocity, axis=1)            # a tangent of a long step predicts no gap closures
+        most = np.divide(most, speed, out=np.full(len(speed), length), where=free & (speed > 0))
+        length = combined(self._comm, float(most.min(initial=length)), MPI.MIN)
+        return self._within_pressure_change(start, velocity, length)
+
+    def prepares(self, ends: bool) -> bool:
+        return ends and self.has_lagged_friction
+
+    def prepare(self, arc_lengths: np.ndarray, places: np.ndarray, length: float, ends: bool,
+                guessed: np.ndarray | None = None, speeds: np.ndarray | None = None) -> None:
+        """Store the predicted positions at which gaps close; lagged friction needs them for its pressure."""
+        self.face.set_closures(places)
+
+    def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """Return True if a new point is deeper in the tool than twice its tributary length.
+
+        Args:
+            old: locally owned unknowns at the start of the step, shape (n,).
+            old_control: control at the start of the step.
+            new: locally owned unknowns at its end, shape (n,).
+            control: load parameter (control) at the end of the step, dimensionless.
+        """
+        face = self.face
+        a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
+        deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
+        return bool(combined(self._comm, float(deep.max(initial=0.0)), MPI.MAX) > 0)
+
+    def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
+        return False                                        # points open and close between steps only
+
+    def rejection(self, old: Any, new: Any, n: int, length: float, ends: bool) -> StepRejection | None:
+        found = super().rejection(old, new, n, length, ends)
+        if found is not None or not length > LIMITS.min_length:
+            return found
+        change = self.change_of_pressure(new.x[:n], new.control)
+        if change > LAGGED.rejection_ratio * LAGGED.max_pressure_change:
+            return StepRejection("the pressure that limits friction changes", LAGGED.max_pressure_change / change)
+        return None
+
+    @property
+    def settling(self) -> int:                              # type: ignore[override]
+        return LAGGED.settling_iterations if self.has_lagged_friction else 0
+
+    def separate(self, fields: np.ndarray, control: float) -> bool:
+        """Open the points in tension; return True if there are any. Collective.
+
+        fields, control: locally owned unknowns, shape (n,), and load parameter of the converged state.
+        """
+        face, variables = self.face, self.face.get()
+        if variables is None or not face.contact.separates:
+            return False
+        history, x = variables.history, face.positions(fields, control)
+        free = face.law.in_tension(x, history) & ~variables.newly_closed
+        found = bool(combined(self._comm, int(free.sum()), MPI.SUM))
+        if found:
+            face.put(variables._replace(history=history._replace(
+                position=np.where(free[:, None], x, history.position),
+                distance=np.where(free, -2 * face.law.theta, history.distance))))
+        return found
+
+    def correct(self, fields: np.ndarray, control: float, at_target: bool, sweep: int) -> bool:
+        """Close points that penetrated the tool during a step, and renew the pressure that bounds friction.
+
+        At a target this applies to all tools, otherwise only to tools with friction. The contact pressure of this state
+        then bounds the friction of all points, in place of the pressure of the last accepted state.
+
+        fields, control: locally owned unknowns, shape (n,), and load parameter of the converged state. sweep: number of
+        earlier calls for this step. Return True if the state must be solved for again.
+        """
+        late = (at_target or self.has_lagged_friction) and self._close_penetrated(fields, control)
+        return (sweep < LAGGED.max_corrections and self.update_pressure(fields, control)) | late
+
+    def _close_penetrated(self, fields: np.ndarray, control: float) -> bool:
+        """Close the gaps of open points that are deeper in the tool than is negligible; collective.
+
+        Each such point sticks or slides from the position where its path in the step met the tool. Return True if
+        there are such points. fields, control: locally owned unknowns and load parameter of the state.
+        """
+        face, variables = self.face, self.face.get()
+        if variables is None:
+            return False
+        old, x, theta = variables.history, face.positions(fields, control), face.law.theta
+        late = (old.distance <= -theta) & (face.law.distance(x) > LIMITS.negligible_gap * face.thickness)
+        found = bool(combined(self._comm, int(late.sum()), MPI.SUM))
+        if found:
+            new = face.law.tractions(x, old).history
+            face.put(variables._replace(history=ContactHistory(*(
+                np.where(late if a.ndim == 1 else late[:, None], b, a) for a, b in zip(old, new)))))
+        return found
+
+    @property
+    def has_lagged_friction(self) -> bool:
+        """True if friction is lagged: the pressure of the last accepted state bounds the friction in the step."""
+        return bool(0 < self.face.law.mu < np.inf)
+
+    def change_of_pressure(self, new: np.ndarray, control: float) -> float:
+        """Return the relative change of the contact pressure in a step with lagged friction.
+
+        Args:
+            new: locally owned unknowns at the end of the step, shape (n,).
+            control: load parameter (control) at the end of the step, dimensionless.
+
+        Returns:
+            Change of the pressure since the last accepted state over the pressure there; 0 without lagged friction.
+        """
+        return self._pressure_difference(self.face.tractions(new, control).normal) if self.has_lagged_friction else 0.0
+
+    def update_pressure(self, new: np.ndarray, control: float) -> bool:
+        """Replace the pressure that bounds lagged friction by the pressure at the end of the step.
+
+        Args:
+            new: locally owned unknowns at the end of the step, shape (n,).
+            control: load parameter (control) at the end of the step, dimensionless.
+
+        Returns:
+            True if the pressure was updated. False if both pressures agree to `LaggedLimits.max_pressure_difference`,
+            or friction is not lagged.
+        """
+        if not self.has_lagged_friction:
+            return False
+        face, law = self.face, self.face.law
+        now = face.tractions(new, control).normal
+        if self._pressure_difference(now, law.friction_pressure(face.history)) <= LAGGED.max_pressure_difference:
+            return False
+        face.set_closures(law.closure_at_pressure(face.history, now))
+        return True
+
+    def renew_pressure(self, new: np.ndarray, control: float) -> bool:
+        """Replace the contact pressure stored at the last accepted state by the pressure of a state at a target.
+
+        On tools in three dimensions the stored pressure bounds the friction of a step. Where a sheet slides, the
+        tangential part of a fluid pressure also decreases with the stored pressure.
+
+        Args:
+            new: locally owned unknowns of the state, which meets a target of the run, shape (n,).
+            control: load parameter (control) of the state, dimensionless.
+
+        Returns:
+            True if the pressure was replaced. False if both agree to `LaggedLimits.max_target_difference` in the
+            area-weighted 1-norm, or if no pressure is stored for friction.
+        """
+        face, law, variables = self.face, self.face.law, self.face.get()
+        if variables is None or face.contact.sticks:
+            return False
+        old, depth = variables.history, np.maximum(law.distance(face.positions(new, control)), 0.0)
+        history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), closure=old.position)
+        now = law.pressure(history)
+        sums = np.array([face.rule.area @ np.abs(now - law.friction_pressure(old)), face.rule.area @ now])
+        change, pressure = combined(self._comm, sums, MPI.SUM)
+        if change <= LAGGED.max_target_difference * (pressure + LAGGED.min_force * face.force_scale):
+            return False
+        face.put(variables._replace(history=history))
+        return True
+
+    def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
+        """Return the arc length after which the contact pressure has changed by a given fraction.
+
+        The fraction is `LaggedLimits.max_pressure_change`. The pressure is extrapolated linearly from the last accepted
+        state. Lagged friction is bounded by the pressure at that state.
+
+        Args:
+            start: positions of the points relative to the tool, shape (n, c), length.
+            velocity: their derivatives by arc length, shape (n, c), length.
+            length: largest arc length.
+
+        Returns:
+            Arc length, at most `length`; `length` without lagged friction.
+        """
+        if not self.has_lagged_friction:
+            return length
+        law, history = self.face.law, self.face.history
+        rate = law.k * np.einsum("ni,ni->n", law.motion(start, history).normal, velocity)
+        change = self._pressure_difference(law.pressure(history) + length * rate)
+        return length * min(LAGGED.max_pressure_change / change, 1.0) if change else length
+
+    def _pressure_difference(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
+        """Return the relative difference between two pressure fields in the area-weighted 1-norm.
+
+        The difference is summed over the points that were under pressure at the last accepted state. It is divided by
+        the total normal force at that state plus a small force (`LaggedLimits.min_force`).
+
+        Args:
+            normal: normal tractions, shape (n,), stress; tension counts as 0.
+            other: pressure to compare with, shape (n,), stress; None: the pressure at the last accepted state.
+
+        Returns:
+            Relative difference over all ranks.
+        """
+        face, before = self.face, self.face.law.pressure(self.face.history)
+        difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
+        sums = np.array([face.rule.area @ np.where(before > 0, difference, 0.0), face.rule.area @ before])
+        change, pressure = combined(self._comm, sums, MPI.SUM)
+        return float(change / (pressure + LAGGED.min_force * face.force_scale))
