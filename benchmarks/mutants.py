@@ -209,7 +209,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("extensions/kbkz/integral.py", "for i in range(4) for j in range(4)) / 4",
      "for i in range(4) for j in range(4)) / 2", "kbkz kbkz_scenes"),
     ("extensions/heat/conduction.py", "- self._c * ufl.derivative(R, T)", "- 0.5 * self._c * ufl.derivative(R, T)",
-     "heat details"),
+     "heat"),
     ("extensions/heat/boundaries.py", "return h * (air - T)", "return 1.001 * h * (air - T)", "heat"),
     ("extensions/heat/contact.py", "h / 30 * np.array([[4, 2, -1]", "h / 30 * np.array([[4, 2, 1]", "heat"),
     # laws

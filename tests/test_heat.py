@@ -38,6 +38,22 @@ def fixed_steps(body, end, steps):
     return state
 
 
+def test_tangent_of_a_step_is_the_derivative_of_its_heat():
+    """M dT - c dR/dT dT, with conduction, convection, radiation and a tool of constant temperature."""
+    rng, c, size = np.random.default_rng(3), 2.0, 1e-3
+    body = body_of(strip(), [fx.Convection("bottom", h=30.0, air=180.0), fx.Radiation("bottom", emissivity=0.9,
+                   heater=500.0), fx.ContactWithTool("top", conductance=400.0, tool=20.0)], lambda R, Z: 80 + 3e4 * Z)
+    state = body.start()
+    change, touch = rng.standard_normal(len(state[0])), body.tool_contacts[0]
+    up, down = (body.rates([state[0] + sign * size * change, state[1]])[0][0] for sign in (1, -1))
+    exact = body.mass(change) - c * (up - down) / (2 * size)
+    body.rates(state)
+    body._factorise(c, [touch.response(state[1], 0 * state[1], c)], afresh=True)
+    body._rhs.array_w[:] = change
+    body._matrix.mult(body._rhs, body._out)
+    np.testing.assert_allclose(body._out.array_r, exact, atol=1e-8 * np.abs(exact).max())
+
+
 # the references against each other
 
 def test_series_and_finite_volumes_agree():
