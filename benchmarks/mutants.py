@@ -281,7 +281,7 @@ def outcome(mutant: Mutant, tree: Path) -> str:
     try:
         done = subprocess.run(command, cwd=tree, timeout=LIMIT, capture_output=True, text=True, check=False,
                               env=os.environ | {"PYTHONPATH": str(tree)}, start_new_session=True)
-        if done.returncode > 1:
+        if done.returncode not in (0, 1):
             return f"pytest ended with {done.returncode}"
         said = [line for line in done.stdout.splitlines() if line.startswith(("FAILED", "ERROR"))]
         first = said[0].split()[1].removeprefix("tests/") if said else done.stdout.strip()[-200:]

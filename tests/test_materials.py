@@ -167,6 +167,16 @@ def test_sum_of_powers_in_high_precision(alpha):
                 assert np.linalg.norm(part - exact) < (5e-14 if ratio < 0.999 else 1e-10) * np.linalg.norm(exact)
 
 
+def test_energy_of_ogden_at_changed_volume():
+    """A term of a negative exponent has the stretch of the area across each direction: (l2 l3)^2 for alpha = -2."""
+    stretches, (c, s) = np.array([1.7, 0.6, 1.3]), (np.cos(0.4), np.sin(0.4))
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+    rubber = fx.Ogden(mu=(1.4, -0.3), alpha=(2.5, -2.0))
+    F = ufl.as_matrix((turn @ np.diag(stretches) @ turn.T).tolist())
+    exact = 1.4 / 2.5 * (np.sum(stretches**2.5) - 3) + 0.15 * (np.sum((stretches.prod() / stretches) ** 2) - 3)
+    assert float(rubber.strain_energy(F, **rubber.parameters)(())) == pytest.approx(exact, rel=1e-12)
+
+
 @pytest.mark.parametrize("alpha", [-2.0, 1.3, *(pytest.param(a, marks=pytest.mark.thorough) for a in (2.0, 5.0))])
 def test_powers_for_every_perturbation(alpha):
     """Derivatives by all nine entries of F, where two, three or no stretches are equal."""
