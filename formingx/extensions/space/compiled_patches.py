@@ -160,7 +160,8 @@ static double project(const double *P, const double *x, double u, double v, doub
         double w = 1 - u - v, g[2] = {dot(r, S[1]), dot(r, S[2])};
         double a = dot(S[1], S[1]), b = dot(S[1], S[2]), c = dot(S[2], S[2]);
         double A = a + dot(r, S[3]), B = b + dot(r, S[4]), C = c + dot(r, S[5]);
-        if (!(A > 1e-3 * a && A * C - B * B > 1e-6 * a * c)) { A = a; B = b; C = c; }
+        int newton = A > 1e-3 * a && A * C - B * B > 1e-6 * a * c;
+        if (!newton) { A = a; B = b; C = c; }
         double det = A * C - B * B, du = -(C * g[0] - B * g[1]) / det, dv = -(A * g[1] - B * g[0]) / det;
         int on[3] = {u <= 0, v <= 0, w <= 1e-15};
         if ((on[0] && du < 0) || (on[1] && dv < 0) || (on[2] && du + dv > 0))
@@ -170,7 +171,7 @@ static double project(const double *P, const double *x, double u, double v, doub
         if (dv < 0 && v + most * dv < 0) most = -v / dv;
         if (du + dv > 0 && most * (du + dv) > w) most = w / (du + dv);
         if (fabs(du) + fabs(dv) < 1e-13 || most * (fabs(du) + fabs(dv)) < 1e-14) break;
-        int better = 0;
+        int better = 0, last = newton && most == 1 && fabs(du) + fabs(dv) < 1e-6;    /* quadratic convergence */
         for (int half = 0; half < 12; half++, most /= 2) {
             double nu = u + most * du, nv = v + most * dv, T[6][3], s[3];
             if (nu < 1e-15) nu = 0;
@@ -185,7 +186,7 @@ static double project(const double *P, const double *x, double u, double v, doub
                 break;
             }
         }
-        if (!better) break;
+        if (!better || last) break;
     }
     *pu = u; *pv = v;
     return f;
