@@ -9,7 +9,6 @@ from ...errors import positive
 from ...results import files
 from ...results.show.views import plotted
 
-
 _STEEPNESS = 0.1
 """Default of the largest displacement of a drawn mode over the length of its waves: higher waves look like spikes."""
 
