@@ -238,3 +238,24 @@ def test_ranks_agree():
     serial, *others = [run_json(RANKS, ranks) for ranks in (1, 2, 3)]
     for other in others:
         assert other == pytest.approx(serial, rel=1e-8, abs=1e-9)
+
+
+@pytest.mark.parametrize("stiff, layers", [(500.0, 2), (1000.0, 4)])
+def test_stress_in_a_soft_layer_beside_a_stiff_one(stiff, layers):
+    """Of a sphere whose inner layer is soft: the difference of hoop and radial stress, far below the mean stress, is
+    that of the closed form mu (l^2 - l^-4), with the stretch l of each radius."""
+    mesh = fx.mesh.sphere(inner_radius=1.0, thickness={"soft": 0.2, "stiff": 0.2}, elements=(16, layers))
+    scene = fx.Scene(mesh=mesh, loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("equator", "z")],
+                     materials={"soft": fx.NeoHookean(c10=0.5), "stiff": fx.NeoHookean(c10=stiff / 2)})
+    path = fx.trace(scene, until=fx.pole_height(1.6), progress=False)
+    field, angles = path.stress(), np.linspace(0.1, 1.45, 12)
+    grown = float(np.mean(np.hypot(*path.profile().bottom.T) ** 3)) - 1.0
+    for R in (1.0 + 1e-3, 1.1, 1.2 - 1e-3):
+        n = np.column_stack([np.cos(angles), np.sin(angles)])
+        sigma = field.at_points(R * n, "soft").cauchy
+        l = (R**3 + grown) ** (1 / 3) / R
+        difference = sigma[:, 2, 2] - np.einsum("ni,nij,nj->n", n, sigma[:, :2, :2], n)
+        assert np.abs(sigma[:, 2, 2]).min() > 5 * difference.max()
+        assert difference == pytest.approx(np.full(12, l**2 - l**-4), rel=0.06)
+    assert field.error("soft").relative < 0.01

@@ -9,6 +9,11 @@ F and S are projected (L2) on piecewise linear fields, one for each layer. All o
 by point. S does not rotate with the sheet. A projection of the Cauchy stress would falsify the small stress normal to
 an inflated sheet by the large stress along the sheet.
 
+In a soft layer beside a stiff one the mean stress is much larger than the differences of the principal stresses. The
+product of projected fields would falsify these. So a constant :math:`\bar p` of each layer is split off, and
+:math:`S + \bar p J C^{-1}` takes the place of S. It is minus the volume mean of the principal stress of least
+magnitude. It is near 0 in an inflated sheet.
+
 The error of the stresses is estimated as by Zienkiewicz and Zhu, Int. J. Numer. Meth. Engng 24 (1987) 337
 (doi:10.1002/nme.1620240206): as the difference from a smoother field. This field comes from cubics fitted to F and S
 (`patches`), whose order is higher. Projected fields are no more accurate than the stresses of the elements.
@@ -61,7 +66,8 @@ class StressField:
 
     def __init__(self, recovery: Stresses, state: Any):
         self._recovery, self._state = recovery, state
-        self._nodes = recovery.project(state)
+        self._pressures = recovery.layer_pressures(state)
+        self._nodes = recovery.project(state, self._pressures)
 
     def at_points(self, points: ArrayLike, layer: str | None = None) -> Stress:
         """Return the projected stresses at points; collective.
@@ -87,7 +93,8 @@ class StressField:
             dofs = recovery.space.dofmap.list[place.cells]
             column = list(recovery.cells).index(layer)
             values[place.numbers] = np.einsum("nk,nkc->nc", shapes[0], self._nodes[dofs, column])
-        return _unpack(positions, comm.allreduce(values, MPI.SUM))
+        pressure = self._pressures[list(recovery.cells).index(layer)]
+        return _unpack(positions, _shifted(comm.allreduce(values, MPI.SUM), -pressure))
 
     def in_cells(self, reference: np.ndarray) -> Stress:
         """Return the projected stresses at k points in each of the m cells that this rank owns.
@@ -108,6 +115,7 @@ class StressField:
         nodes = self._nodes[recovery.space.dofmap.list[:owned], column[:, None]]
         shapes: Any = recovery.element.tabulate(0, reference)
         values = np.einsum("kn,cnx->ckx", shapes[0], nodes)
+        values = _shifted(values, -self._pressures[column][:, None])
         return _unpack(np.zeros((owned * len(reference), COORDINATES)), values.reshape(-1, _COUNT))
 
     def at_quadrature_points(self, layer: str | None = None) -> Stress:
@@ -251,14 +259,34 @@ class Stresses:
         check_name("stress: layer", name, self.cells)
         return name
 
-    def project(self, state: Any) -> np.ndarray:
+    def layer_pressures(self, state: Any) -> np.ndarray:
+        """Return the pressure of each layer that is split off before the projection, shape (layers,), stress.
+
+        It is minus the volume mean of the principal Cauchy stress of least magnitude in a state. Collective.
+        """
+        found = np.zeros((2, len(self.cells)))
+        for k, layer in enumerate(self.cells):
+            _, values, volume = self._at_quadrature(state, layer)
+            principal = np.linalg.eigvalsh(_cauchy(values))
+            least = np.take_along_axis(principal, np.abs(principal).argmin(-1)[..., None], -1)[..., 0]
+            found[:, k] = -np.sum(volume * least), volume.sum()
+        total = self.problem.comm.allreduce(found, MPI.SUM)
+        return total[0] / total[1]
+
+    def project(self, state: Any, pressures: np.ndarray) -> np.ndarray:
         """Return nodal values of the deformation gradient F and the second Piola-Kirchhoff stress S of a state.
 
-        F and S are projected on piecewise linear fields, one for each layer. Collective.
+        F and S plus p J C^-1, with the pressure p of the layer, are projected on piecewise linear fields, one for each
+        layer. Collective.
+
+        Args:
+            state: the state.
+            pressures: pressure of each layer, shape (layers,), stress.
 
         Returns:
             F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop, shape (nodes, layers, 9), with ghost nodes.
         """
+        self._pressures.value[:] = pressures
         with self.problem.state_context(state):
             return self._projected()
 
@@ -294,8 +322,22 @@ class Stresses:
             first = comm.exscan(owned) or 0
             points_of_all, numbers, layer = (gathered(comm, v) for v in (points, numbers, layer))
             self._patches = Patches(points_of_all, numbers, layer, np.arange(first, first + owned))
-        cubics = self._patches.fit(gathered(comm, values))
-        return Fitted(points, volume, _cauchy(values), _cauchy(self._patches.evaluate(cubics, points)), cubics)
+        pressures = np.concatenate([np.full(len(self._owned(layer)), pressure) for layer, pressure in
+                                    zip(self.cells, self.layer_pressures(state), strict=True)])[order]
+        cubics = self._patches.fit(gathered(comm, _shifted(values, pressures[:, None])))
+        smooth = self._fitted_cauchy(cubics, pressures, points)
+        return Fitted(points, volume, _cauchy(values), smooth, cubics, pressures)
+
+    def _fitted_cauchy(self, cubics: np.ndarray, pressures: np.ndarray, points: np.ndarray) -> np.ndarray:
+        """Return the Cauchy stress of fitted cubics at q points of each of m cells, shape (m, q, 3, 3), stress.
+
+        Args:
+            cubics: coefficients of the cubics, shape (m, 10, 9).
+            pressures: pressures of the layers of the cells, shape (m,), stress.
+            points: reference positions of the points, shape (m, q, 2), length.
+        """
+        assert self._patches is not None
+        return _cauchy(_shifted(self._patches.evaluate(cubics, points), -pressures[:, None]))
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
         """Return for each of this rank's m cells the largest fitted principal Cauchy stress at its corners.
@@ -309,8 +351,7 @@ class Stresses:
         """
         owned = own_cells(self.problem.forms.domain)
         X = cell_node_positions(self.problem.forms.domain, owned)[:, :3]
-        assert self._patches is not None
-        largest = np.linalg.eigvalsh(_cauchy(self._patches.evaluate(fitted.cubics, X)))[..., -1]
+        largest = np.linalg.eigvalsh(self._fitted_cauchy(fitted.cubics, fitted.pressures, X))[..., -1]
         top = (owned, largest.argmax(1))
         return largest[top], X[top]
 
@@ -390,6 +431,8 @@ class Stresses:
         mass: Any = 0
         rhs: Any = 0
         column = {name: k for k, name in enumerate(self.cells)}
+        self._pressures = fem.Constant(domain, np.zeros(len(self.cells), dtype=PETSc.ScalarType))
+        unit = ufl.det(forms.F) * ufl.inv(forms.F.T * forms.F)
         for _, names in bodies:
             parts = self._parts(names)
             for name in names:
@@ -399,6 +442,8 @@ class Stresses:
                 for S, metadata in parts:
                     picked = sum(self._selector[len(BLOCK) + i] * s for i, s in enumerate(S))
                     rhs += picked * test[k] * (dx(metadata=metadata) if metadata else dx)
+                split = self._pressures[k] * sum(self._selector[len(BLOCK) + i] * unit[s] for i, s in enumerate(_S))
+                rhs += split * test[k] * (dx(metadata=metadata) if metadata else dx)     # the rule of the volume term
         forms.compile_ahead(rhs, mass)
         self._rhs = forms.compile(rhs)
         self._vector = la.vector(self.space.dofmap.index_map, len(self.cells))
@@ -428,6 +473,22 @@ class Stresses:
         used.scatter_forward()
         return [fem.dirichletbc(PETSc.ScalarType(0), (np.flatnonzero(touched[:, k] == 0) * n + k).astype(np.int32),
                                 self.space.sub(k)) for k in range(n)]
+
+
+def _shifted(values: np.ndarray, pressure: Any) -> np.ndarray:
+    """Return values of F and S, shape (..., 9), with S + p J C^-1 in place of S.
+
+    Args:
+        values: F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop, shape (..., 9).
+        pressure: the pressure p, of a shape that fits (...), stress.
+    """
+    (a, b, c, d, hoop), found = np.moveaxis(values[..., :len(BLOCK)], -1, 0), values.copy()
+    det = a * d - b * c
+    # J C^-1 = J F^-1 F^-T, with J = det hoop
+    unit = np.stack([(d * d + b * b) / det * hoop, -(c * d + a * b) / det * hoop, (a * a + c * c) / det * hoop,
+                     det / hoop], axis=-1)
+    found[..., len(BLOCK):] += np.asarray(pressure)[..., None] * unit
+    return found
 
 
 def _cauchy(values: np.ndarray) -> np.ndarray:

@@ -126,7 +126,8 @@ class Fitted(NamedTuple):
         raw: computed Cauchy stress sigma_h, shape (m, q, 3, 3), stress.
         smooth: fitted Cauchy stress sigma*, shape (m, q, 3, 3), stress.
         cubics: coefficients of the cubics (`Patches`) fitted to F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz and
-            S_hoop, shape (m, 10, 9).
+            S_hoop, shape (m, 10, 9); the pressure of the layer is split off S.
+        pressures: pressure of the layer of each cell, shape (m,), stress.
     """
 
     points: np.ndarray
@@ -134,6 +135,7 @@ class Fitted(NamedTuple):
     raw: np.ndarray
     smooth: np.ndarray
     cubics: np.ndarray
+    pressures: np.ndarray
 
     def error(self, exact: Callable | None = None) -> StressError:
         """Return the errors of the computed stress in this rank's cells: its differences from a more accurate stress.
