@@ -56,7 +56,7 @@ def test_weight_knows_the_unit_of_length(length):
 def test_mass_is_kept(inflated, formed):
     for path, volume in ((inflated, np.pi * 1.25**2 * 0.082), (formed, np.pi * 10**2 * 0.3)):
         part = path.part()
-        assert part.volume == pytest.approx(volume, rel=1e-3)          # a rim that bulges is not between the faces
+        assert part.volume == pytest.approx(volume, rel=1e-3)
         assert part.mean_wall * part.area == pytest.approx(part.volume, rel=1e-12)
         assert part.min_wall < part.mean_wall and part.uniformity == pytest.approx(part.min_wall / part.mean_wall)
 
@@ -75,7 +75,9 @@ def test_capacity_of_closed_and_open_parts():
 
 def test_trimmed_parts_add_up(formed):
     whole, inner = formed.part(), formed.part(trim=6.0)
-    assert inner.volume == pytest.approx((1 - inner.scrap) * whole.volume, rel=1e-12) and inner.scrap > 0.1
+    weights = [formed.part(trim=trim, density=0.9, units=fx.Units("mm")).weight for trim in (None, 6.0)]
+    assert weights[1] == pytest.approx((1 - inner.scrap) * weights[0], rel=1e-12) and inner.scrap > 0.1
+    assert inner.volume == pytest.approx((1 - inner.scrap) * whole.volume, rel=1e-3)
     with pytest.raises(fx.InputError, match="trim = 99.* goes from"):
         formed.part(trim=99.0)
     with pytest.raises(fx.InputError, match="trim along 'x' is not known"):
@@ -335,3 +337,58 @@ def test_the_outline_of_a_block_bulges_as_its_rim(kinematics, tmp_path):
     drawn, = (run["sheet"] for run in json.loads(interactive.data(
         [of_checkpoint(*contents(tmp_path / "run"))], ["run"], fx.Units()))["runs"])
     np.testing.assert_allclose(np.array(drawn["end"][-1]).T, profile.end, atol=1e-4)
+
+
+def crushed_block(friction="stick"):
+    """The upper half of a block that bulges between plates."""
+    plate = [fx.Contact(face, fx.tools.plane(1.0), friction, direction=(0, -1)) for face in ("top", "rim")]
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.2, thickness=1.0, elements=(6, 5)), contacts=plate,
+                     materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", "z")])
+    return fx.trace(scene, until=fx.travel(0.35), progress=False)
+
+
+def trough():
+    """The half of a strip in plane strain that is blown into a trough."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(16, 1)), kinematics=fx.PlaneStrain(),
+                     materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                     supports=[fx.Symmetry("axis", "r"), fx.Clamped("rim")])
+    return fx.trace(scene, until=fx.pole_height(4.0), progress=False)
+
+
+def volume_of_stl(file):
+    from formingx.io.stl import volume
+    content = np.frombuffer(file.read_bytes()[84:], dtype=np.dtype([("v", "<f4", 12), ("rest", "<u2")]))
+    points = content["v"].reshape(-1, 4, 3)[:, 1:].reshape(-1, 3).astype(float)
+    return volume(points, np.arange(len(points)).reshape(-1, 3)), points
+
+
+def test_volume_of_a_crushed_block_includes_its_bulge():
+    """It is the undeformed volume of the whole block; there is no wall in a block."""
+    part = crushed_block().part(density=1.0, units=fx.Units("cm"))
+    assert part.volume == pytest.approx(2 * np.pi * 1.2**2, rel=2e-3)
+    assert part.weight == pytest.approx(part.volume, rel=2e-3)
+    assert np.isnan([part.min_wall, part.mean_wall, part.uniformity, part.variation]).all() and "wall" not in str(part)
+
+
+@pytest.mark.parametrize("make", (lambda: sphere(1.0, 0.2, (12, 1)), crushed_block))
+def test_files_hold_the_whole_part(make, tmp_path):
+    """Where a half is modelled, the volume of the STL is that of the whole part, and it is symmetric."""
+    path = make()
+    path.to_stl(tmp_path / "part.stl")
+    volume, points = volume_of_stl(tmp_path / "part.stl")
+    assert volume == pytest.approx(path.part().volume, rel=3e-3)
+    assert points[:, 2].min() == pytest.approx(-points[:, 2].max(), rel=1e-6)
+    path.to_inp(tmp_path / "part.inp", parts=12)
+    nodes = [line.split(",") for line in (tmp_path / "part.inp").read_text().splitlines() if line.count(",") == 3
+             and line[0].isdigit()]
+    z = [float(row[3]) for row in nodes]
+    assert min(z) == pytest.approx(-max(z), rel=1e-9, abs=1e-9)
+
+
+def test_files_hold_both_halves_of_a_trough(tmp_path):
+    path = trough()
+    path.to_stl(tmp_path / "part.stl")
+    volume, points = volume_of_stl(tmp_path / "part.stl")
+    width = np.ptp(points[:, 0])
+    assert width == pytest.approx(20.0, rel=1e-6) and points[:, 0].min() == pytest.approx(-10.0, rel=1e-6)
+    assert volume / width == pytest.approx(path.part().volume, rel=2e-3)

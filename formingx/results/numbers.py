@@ -46,7 +46,7 @@ class PartNumbers(KeyNumbers):
         uniformity: minimum wall over mean wall.
         variation: coefficient of variation of the wall over the middle surface: standard deviation over mean value.
         weight: weight in grams, or None without a density.
-        scrap: fraction of the volume of the whole sheet that lies beyond the trim.
+        scrap: fraction of the undeformed volume, and so of the weight, of the whole sheet that lies beyond the trim.
         basis: reference of volume, area and weight as text, such as "the part, per mm of depth"; "" for a part that is
             modelled whole.
     """
@@ -77,11 +77,12 @@ class PartNumbers(KeyNumbers):
         rows = [("given for", self.basis)] if self.basis else []
         if self.weight is not None:
             rows += [(self.weight_label, self._with_unit(self.weight, self.units.weight))]
-        rows += [("minimum wall", f"{self._length(self.min_wall)} at {where}"),
-                 ("mean wall", self._length(self.mean_wall)),
-                 ("uniformity (minimum over mean wall)", f"{self.uniformity:.4g}"),
-                 ("coefficient of variation of the wall", f"{self.variation:.4g}"),
-                 ("areal draw ratio", f"{self.draw_ratio:.4g}"),
+        if self.min_wall == self.min_wall:                   # not of a block
+            rows += [("minimum wall", f"{self._length(self.min_wall)} at {where}"),
+                     ("mean wall", self._length(self.mean_wall)),
+                     ("uniformity (minimum over mean wall)", f"{self.uniformity:.4g}"),
+                     ("coefficient of variation of the wall", f"{self.variation:.4g}")]
+        rows += [("areal draw ratio", f"{self.draw_ratio:.4g}"),
                  ("volume", self._with_unit(self.volume, self.units.volume)),
                  ("area of the middle surface", self._with_unit(self.area, self.units.area)), *further]
-        return rows + ([("scrap, of the sheet's volume", f"{100 * self.scrap:.3g} %")] if self.scrap else [])
+        return rows + ([("scrap, of the sheet's weight", f"{100 * self.scrap:.3g} %")] if self.scrap else [])

@@ -14,7 +14,7 @@ from ..figures import Axes
 from ..findings import Finding, findings_at, worst_first
 from ..solve.state import State
 from ..units import NONE, Units
-from .evaluate.profile import Profile
+from .evaluate.profile import Profile, whole_part
 from .evaluate.stress import StressField
 from .reader import Reader, SectionReader
 from .show.picture import Picture
@@ -391,7 +391,8 @@ class Path(States):
         """Write the part as shell elements with the wall as thickness, for CalculiX or Abaqus (rank 0 writes).
 
         The elements are S8R, at the axis S6, on the middle surface. The element set is WALL, the node sets are ALL and
-        RIM, the outer end of the part. The file contains no material.
+        RIM, the outer end of the part; both ends, if only a half between them is modelled. The file contains no
+        material.
 
         Args:
             file: its name ends in .inp.
@@ -406,7 +407,7 @@ class Path(States):
         self.section_only("to_inp", "use shell_model")
         if not self.problem.scene.kinematics.axisymmetric or count("to_inp: parts", parts) < 3:
             raise InputError(f"to_inp: parts = {parts!r}: must be at least 3, of an axisymmetric body")
-        to_inp(self.profile(state), parts, file, self.problem.comm)
+        to_inp(whole_part(self.profile(state), self.scene.symmetry), parts, file, self.problem.comm)
 
     def to_gltf(self, file: Any, state: State | None = None, *, units: Units | None = None) -> None:
         """Write the part in a state as binary glTF, coloured by its wall (rank 0 writes).

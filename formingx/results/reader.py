@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any, Protocol
 from ..errors import InputError
 from ..solve.state import State
 from ..units import Units
+from .evaluate.profile import Profile, whole_part
 from .evaluate.wall import Walls
 from .numbers import KeyNumbers
 
@@ -122,17 +123,21 @@ class SectionReader:
         """Draw the revolved or extruded section in a state as a PNG file; `grid` is not used."""
         from .show import views
         draw = views.revolved if self._axisymmetric else views.extruded
-        draw(self._path.profile(state), file, self._path.problem.comm)
+        draw(self._whole(state), file, self._path.problem.comm)
 
     def solid(self, state: State) -> tuple:
-        """Return the closed surface of the revolved or extruded section in a state.
+        """Return the closed surface of the whole part in a state, the revolved or extruded section.
 
         Returns:
             Points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3); wall
             over original thickness at the points, shape (n,).
         """
         from .files.solid import coloured
-        return coloured(self._path.profile(state), self._axisymmetric)
+        return coloured(self._whole(state), self._axisymmetric)
+
+    def _whole(self, state: State) -> Profile:
+        """Return the profile of the whole part in a state, also if a half or a quarter is modelled."""
+        return whole_part(self._path.profile(state), self._path.scene.symmetry)
 
     def report(self, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
         """Write the report of the run as an HTML file.

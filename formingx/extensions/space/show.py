@@ -67,10 +67,15 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
     files.on_root(path.problem.comm, draw)
 
 
+_LARGEST_MITRE = 3.0
+"""Largest distance of a node from the mid-surface over half of the wall, at a sharp fold."""
+
+
 def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the closed surface of the whole part in a state, completed by mirror images.
 
-    Half of the wall thickness lies on each side of the mid-surface, along the normals at the nodes.
+    Half of the wall thickness lies on each side of the mid-surface. Nodes are moved along their normals, at folds by
+    so much more that the volume is that of the walls.
 
     Args:
         path: the computed `Path`.
@@ -88,7 +93,10 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     np.add.at(normal, wall.triangles.ravel(), np.repeat(each, 3, axis=0))
     for plane, mask in zip(planes.planes, on):
         normal[mask, plane.axis] = 0.0
-    normal *= wall.at_nodes[:, None] / 2 / np.linalg.norm(normal, axis=1, keepdims=True)
+    area = np.zeros(n)
+    np.add.at(area, wall.triangles.ravel(), np.repeat(np.linalg.norm(each, axis=1), 3))
+    size = np.linalg.norm(normal, axis=1)
+    normal *= (wall.at_nodes / 2 / size * np.minimum(area / size, _LARGEST_MITRE))[:, None]
     directed, _, numbers, times = edges_of(wall.triangles)
     rim = directed[(times[numbers] == 1) & ~np.any([mask[directed].all(1) for mask in on] or [False], axis=0)]
     side = np.concatenate([np.column_stack([rim[:, 1], rim[:, 0], rim[:, 0] + n]),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,6 +15,9 @@ from ..numbers import PartNumbers
 from .profile import refined
 from .wall import Wall
 
+_THICKEST = 0.5
+"""Mean thickness over the length of a section above which the body is a block without a wall."""
+
 
 @dataclass(frozen=True, repr=False)
 class Part(PartNumbers):
@@ -23,7 +26,7 @@ class Part(PartNumbers):
     In plane strain, volume, area, weight and capacity are per unit depth.
 
     Attributes:
-        volume: volume between the two faces, length^3. At the rim it ends on the straight line from face to face.
+        volume: volume between the two faces and the ends of the section, which may bulge, length^3.
         area: area of the middle surface, length^2.
         draw_ratio: area over the reference area of the same material (areal draw ratio).
         mean_wall: volume over area, length.
@@ -34,11 +37,12 @@ class Part(PartNumbers):
         min_wall_reference: reference position of this place on the bottom face: ("R", radius), and for a parison, on
             the inner face, ("Z", height).
         uniformity: minimum wall over mean wall, 1 for a uniform part.
+            The walls, `uniformity` and `variation` are nan for a body thicker than half its length, which is no sheet.
         variation: coefficient of variation of the wall over the middle surface: standard deviation over mean value.
         weight: weight in grams, or None without a density. It uses the volume before thermal expansion, so it does not
             change with the temperature.
         walls: {axial distance from the pole (`Wall.height`): wall there}, both length.
-        scrap: fraction of the volume of the whole sheet that lies beyond the trim.
+        scrap: fraction of the undeformed volume, and so of the weight, of the whole sheet that lies beyond the trim.
         capacity: volume that the part holds, length^3: it lies inside the inner face, up to planes across the ends of
             this face. For a pot, such a plane lies at its rim or trim.
         basis: reference of volume, area, weight and capacity as text, such as "the part, per mm of depth"; "" for an
@@ -93,7 +97,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     profile, images = wall.profile, planes.factor
     basis = planes.basis(None if axisymmetric else units.length or "unit")
     units = units if axisymmetric else units.per_depth()
-    strips = _strips(refined(profile.bottom), refined(profile.top), axisymmetric)
+    strips = _strips(refined(profile.bottom), refined(profile.top), axisymmetric, profile.start, profile.end)
     middle = _surface(refined(profile.middle), axisymmetric)
     reference = _surface(refined((profile.reference_bottom + profile.reference_top) / 2), axisymmetric)
     reference_strips = _strips(refined(profile.reference_bottom), refined(profile.reference_top), axisymmetric)
@@ -106,6 +110,9 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
     coordinate = int(np.argmax(np.ptp(profile.reference_bottom, axis=0)))
     mean = sums[0] / sums[1]
     of_strip = (wall.wall[1:] + wall.wall[:-1]) / 2
+    if profile.original_thickness.mean() > _THICKEST * profile.reference_length[-1]:      # a block has no wall
+        mean, of_strip, wall = np.nan, of_strip * np.nan, replace(wall)
+        vars(wall)["wall"] = np.full(len(wall.r), np.nan)
     average = (of_strip * area * inside).sum() / sums[1]
     spread = ((of_strip - average) ** 2 * area * inside).sum() / sums[1]
     weight = None if density is None else units.mass(images * sums[3], positive("part: density", density))
@@ -114,7 +121,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
                 float(wall.reference_radius[k]),
                 without_round_off((wall.r[k], wall.z[k]), profile.middle), float(wall.height[k]),
                 ("RZ"[coordinate], float(profile.reference_bottom[k, coordinate])), float(wall.wall[k] / mean),
-                float(np.sqrt(spread) / average), weight, walls_at, float(1 - sums[0] / volume.sum()),
+                float(np.sqrt(spread) / average), weight, walls_at, float(1 - sums[3] / before[1].sum()),
                 images * _capacity(wall, inside, axisymmetric), basis, units)
 
 
@@ -162,19 +169,29 @@ def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
     return min(found)
 
 
-def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool) -> np.ndarray:
+def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool, start: np.ndarray | None = None,
+            end: np.ndarray | None = None) -> np.ndarray:
     """Return the volumes of the m - 1 strips between two lines, length^3; in plane strain per unit depth, length^2.
 
     Args:
         bottom: points (r, z) of a line, shape (m, 2), length.
         top: points of the other line opposite them, shape (m, 2), length.
         axisymmetric: False in plane strain.
+        start: points from the first bottom to the first top point, to which the first strip extends, shape (k, 2),
+            length; None: the straight line between them.
+        end: the same from the last bottom to the last top point.
     """
     corners = [bottom[:-1], bottom[1:], top[1:], top[:-1]]
     total = np.zeros(len(bottom) - 1)
     for a, b in zip(corners, corners[1:] + corners[:1]):
         total += _up_to(a, b, axisymmetric)
-    return np.abs(total)
+    sense = np.sign(total.sum())
+    for edge, strip, sign in ((start, 0, -1), (end, -1, 1)):
+        if edge is not None:
+            line = refined(edge)
+            bulge = _up_to(line[:-1], line[1:], axisymmetric).sum() - _up_to(line[:1], line[-1:], axisymmetric)[0]
+            total[strip] += sign * bulge
+    return sense * total if sense else np.abs(total)
 
 
 def _up_to(a: np.ndarray, b: np.ndarray, axisymmetric: bool) -> np.ndarray:

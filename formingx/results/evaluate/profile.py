@@ -11,6 +11,7 @@ from ...errors import InputError, finite, finite_array
 from ...forms.probes import Probe, probe
 from ...mesh.nodes import SAME_PLACE
 from ...mesh.sizes import length_along
+from ...scene.symmetry import MirrorPlane, MirrorPlanes
 from ...values.tolerances import PIECE_POINTS
 
 FACES = (("bottom", "top"), ("inner", "outer"))
@@ -157,6 +158,51 @@ class Profile:
         if not abs(finite("thickness_ratio_at: radius", radius) - (low + high) / 2) <= (0.5 + 1e-9) * (high - low):
             raise InputError(f"thickness_ratio_at: radius = {radius:g}: must be from {low:g} to {high:g}")
         return float(np.interp(radius, self.reference_radius, self.thickness_ratio))
+
+
+def whole_part(profile: Profile, planes: MirrorPlanes) -> Profile:
+    """Return the profile of the whole part, of which a half or a quarter is modelled.
+
+    Args:
+        profile: profile of the modelled body.
+        planes: its mirror planes.
+    """
+    for plane in planes.planes:
+        profile = _joined_with_image(profile, plane, max(planes.near, SAME_PLACE * float(np.ptp(profile.bottom))))
+    return profile
+
+
+def _joined_with_image(profile: Profile, plane: MirrorPlane, near: float) -> Profile:
+    """Return a profile joined with its mirror image; unchanged if neither an end nor a face lies in the plane.
+
+    Args:
+        profile: the profile.
+        plane: the mirror plane.
+        near: tolerance of positions, length.
+    """
+    def image(points: np.ndarray) -> np.ndarray:
+        """Return the mirror images of points, shape (n, 2), length."""
+        unit = np.eye(2)[plane.axis]
+        return points * (1 - 2 * unit) + 2 * plane.position * unit
+
+    def lies_in(points: np.ndarray) -> np.ndarray:
+        """Return a mask of the points that lie in the plane."""
+        return np.abs(points[:, plane.axis] - plane.position) <= near
+    lines = [profile.reference_bottom, profile.reference_top, profile.bottom, profile.top]
+    (first, second), start, end = (lies_in(line) for line in lines[:2]), profile.start, profile.end
+    if first[-1] and second[-1]:
+        lines = [np.vstack([line, image(line[:-1])[::-1]]) for line in lines]
+        return Profile(lines[0], lines[1], lines[2], lines[3], start, None if start is None else image(start))
+    if first[0] and second[0]:
+        lines = [np.vstack([image(line[1:])[::-1], line]) for line in lines]
+        return Profile(lines[0], lines[1], lines[2], lines[3], None if end is None else image(end), end)
+    if first.all():
+        start, end = (None if edge is None else np.vstack([image(edge)[::-1], edge[1:]]) for edge in (start, end))
+        return Profile(image(lines[1]), lines[1], image(lines[3]), lines[3], start, end)
+    if second.all():
+        start, end = (None if edge is None else np.vstack([edge, image(edge[:-1])[::-1]]) for edge in (start, end))
+        return Profile(lines[0], image(lines[0]), lines[2], image(lines[2]), start, end)
+    return profile
 
 
 def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:

@@ -74,8 +74,9 @@ def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
             lines.append(f"*ELEMENT, TYPE={kind}, ELSET=WALL")
             lines += [", ".join(map(str, [k, *row])) for k, row in enumerate((elements + 1).tolist(), first)]
             first += len(elements)
-    rim = np.flatnonzero(np.hypot(*(np.column_stack([np.hypot(*points[:, :2].T), points[:, 2]]) - profile.middle[-1]).T)
-                         < 1e-9 * np.ptp(points)) + 1
+    section = np.column_stack([np.hypot(*points[:, :2].T), points[:, 2]])
+    ends = profile.middle[[-1]] if profile.middle[0, 0] < 1e-9 * np.ptp(points) else profile.middle[[0, -1]]
+    rim = np.flatnonzero((np.linalg.norm(section[:, None] - ends, axis=2) < 1e-9 * np.ptp(points)).any(1)) + 1
     lines += ["*NSET, NSET=RIM", *(f"{k}," for k in rim), "*NODAL THICKNESS"]
     lines += [f"{k}, {wall!r}" for k, wall in enumerate(walls.tolist(), 1)]
     lines += ["** give MATERIAL its constants, here or before: *MATERIAL, NAME=MATERIAL",

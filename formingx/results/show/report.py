@@ -257,8 +257,9 @@ def _cards(record: ReportData, found: Part | None, units: Units) -> str:
     cards = []
     if found is not None:
         length = f" {units.length}" if units.length else ""
-        cards = [(f"{found.min_wall:.4g}{length}", f"minimum wall, at r = {found.min_wall_at[0]:.4g}{length}"),
-                 (f"{found.uniformity:.3g}", "minimum over mean wall"),
+        walls = [(f"{found.min_wall:.4g}{length}", f"minimum wall, at r = {found.min_wall_at[0]:.4g}{length}"),
+                 (f"{found.uniformity:.3g}", "minimum over mean wall")]
+        cards = [*(walls if found.min_wall == found.min_wall else []),
                  (f"{found.weight:.4g} {found.units.weight}", found.weight_label) if found.weight is not None else
                  (f"{found.volume:.{4 if found.volume < 1e4 else 6}g} {units.volume}", "volume of the part")]
     cards += [(value, what) for what, value in _peaks(record, units)]
