@@ -201,6 +201,14 @@ def test_friction_resists_motion_round_the_axis_as_along_the_tool(mu):
     assert found == pytest.approx(along) and np.array_equal(found > 0, [True, True, np.isinf(mu)])
 
 
+def test_energy_of_contact_is_continuous():
+    """At both ends of the ramp, where its formula changes."""
+    law = Law(TOOL, 0.0, K, THETA, SLIP)
+    for end in (-THETA, THETA):
+        inside, outside = (law.energy(points_near(TOOL, [end * (1 + by)])[0]) for by in (-1e-6, 1e-6))
+        np.testing.assert_allclose(inside, outside, atol=1e-5 * K * THETA**2)
+
+
 def test_energy_gained_in_a_pressure_cycle_vanishes_with_the_elastic_slip():
     """Slip under little pressure and back under more: the traction returns mu (N2 - N1) g^2 / (2 g_s), no more."""
     mu, low, high = 0.4, 2 * THETA, 10 * THETA

@@ -120,6 +120,20 @@ def test_new_contact_conducts_for_half_of_its_step():
     assert 0 < means[1] - means[0] < 0.5
 
 
+def test_heat_flows_through_the_shape_in_the_middle_of_a_step():
+    """A flux through a face that grows from pi to 4 pi in a second: q times the integral of the area, 7 pi/3."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.4, elements=(2, 1)), temperature=20.0,
+                     materials=fx.NeoHookean(c10=1.0),
+                     heat=fx.Cooling(fx.ThermalProperties(conductivity=1e3, density=2.0, heat_capacity=3.0),
+                                     [fx.HeatFlux("top", flux=1.0)], unit="C", tolerance=0.01),
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
+                               fx.PrescribedDisplacement("rim", "r", name="rim")])
+    path = fx.Process(scene).run([fx.Stage("pull", control="rim", until=fx.travel(1.0), duration=1.0)], accuracy=0.5,
+                                 step=fx.StepControl(length=0.2, largest=0.2), progress=False)
+    assert 4 < len(path) < 20
+    assert path.temperature(np.array([[0.5, 0.2]]))[0] - 20 == pytest.approx(7 / 3 / (6 * 0.4), rel=0.01)
+
+
 def press(scene, travel=0.15, **options):
     push = fx.Stage("push", control="plug", until=fx.travel(travel), duration=0.5)
     return fx.Process(scene).run([push, fx.Stage("hold", duration=0.5)], progress=False, accuracy="draft", **options)

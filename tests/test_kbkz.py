@@ -93,6 +93,19 @@ def test_shear_at_a_constant_rate(damping):
     assert found == pytest.approx(lodge, rel=1e-9) if damping is None else found < 0.9 * lodge
 
 
+def test_damping_functions_and_their_slopes():
+    """h as its authors write it, from the invariants of a strain, and its derivatives by both invariants."""
+    I1, I2, h = 7.0, 9.0, 1e-5
+    s, J = np.sqrt(0.3 * I1 + 0.7 * I2 - 3), 0.4 * I1 + 0.6 * I2 - 3
+    for law, exact in ((fx.PSM(8.0, 0.3), 8 / (5 + 0.3 * I1 + 0.7 * I2)), (fx.Wagner(0.3, 0.2), np.exp(-0.2 * s)),
+                       (fx.DoubleWagner(0.3, 0.6, 0.3, 0.1), 0.6 * np.exp(-0.3 * s) + 0.4 * np.exp(-0.1 * s)),
+                       (fx.SoskeyWinter(0.4, 0.2, 1.5), 1 / (1 + 0.2 * J**0.75))):
+        value, by_I1, by_I2 = law.derivatives(I1, I2)
+        assert value == law(I1, I2) == pytest.approx(exact, rel=1e-12)
+        assert by_I1 == pytest.approx((law(I1 + h, I2) - law(I1 - h, I2)) / (2 * h), rel=1e-7)
+        assert by_I2 == pytest.approx((law(I1, I2 + h) - law(I1, I2 - h)) / (2 * h), rel=1e-7)
+
+
 def test_shear_starts_without_stress():
     """Without damping the stress is a sum of G tau rate (1 - exp(-t/tau)); negative times are refused."""
     melt, rate, t = fx.KBKZ(SPECTRUM), 3.0, np.array([0.0, 1e-9, 1e-4])

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+import ufl
 from conftest import drawn, run
 from scipy.optimize import brentq
 
@@ -92,6 +93,36 @@ def test_steps_in_time_keep_the_accuracy():
         found[accuracy] = stretch(path)
     assert found[5e-2] == pytest.approx(found[1e-3], rel=5e-3)
     assert found[1e-2] == pytest.approx(found[1e-3], rel=5e-4)
+
+
+def test_stress_of_a_sheet_that_solidifies_while_it_is_stretched():
+    """It tends to that of networks that form free of stress at every stretch, with the square of the step."""
+    G, end = 30.0, 1.5
+    glass = fx.Solidification(fx.NeoHookean(c10=1.0), modulus=G, between=(90, 110))
+    nodes, weights = np.polynomial.legendre.leggauss(40)
+    formed, share = 1.25 + 0.25 * nodes, weights / 2                         # phi grows evenly with the stretch
+    exact = 2 * (end - end**-2) + G * share @ (end / formed**2 - formed / end**2)
+
+    def gradient(l):
+        return ufl.as_matrix(np.diag([l, l**-0.5, l**-0.5]).tolist())
+
+    def numbers(values):
+        return {name: tuple(float(x(())) for x in value) if value.ufl_shape else float(value(()))
+                for name, value in ((name, ufl.as_ufl(value)) for name, value in values.items())}
+
+    def error(steps):
+        state, h = dict(glass.internal), 1e-4
+        for k in range(steps):
+            phi = {"c10": 1.0, "G_set": G, "set_end": np.exp((k + 1) / steps), "set_middle": np.exp((k + 0.5) / steps)}
+            constants = {name: ufl.as_ufl(float(value)) for name, value in phi.items()}
+            before = {name: ufl.as_vector(v) if isinstance(v, tuple) else ufl.as_ufl(v) for name, v in state.items()}
+            l = 1 + (end - 1) * (k + 1) / steps
+            energies = [float(glass.step_energy(gradient(l + d), before, 1.0, **constants)(())) for d in (h, -h)]
+            state = numbers(glass.updated(gradient(l), before, 1.0, **constants))
+        return (energies[0] - energies[1]) / (2 * h) - exact
+    errors = [error(n) for n in (5, 10, 20)]
+    assert abs(errors[2]) < 2e-3 * exact
+    assert errors[0] / errors[1] == pytest.approx(4, rel=0.2) and errors[1] / errors[2] == pytest.approx(4, rel=0.2)
 
 
 def test_hot_material_equals_its_base():

@@ -324,6 +324,16 @@ def test_transient_network_at_a_constant_rate():
     assert material.constant_rate("equibiaxial", rate, l) == pytest.approx(0.5 * (along - across) / l, rel=1e-8)
 
 
+def test_steps_that_grow_do_not_amplify_errors():
+    """An error of one step, over its length, is multiplied by s p/(1 + p) in the next, s times as long."""
+    network = TransientNetwork(None, P0)
+    state = {"C": ufl.as_vector([1.0, 1.0, 0.0, 1.0]), "change": ufl.as_vector([0.0] * 4)}
+    for s in (0.1, 1.0, 2.0, 2.5, 3.0, 3.9, 5.0, 50.0):
+        p = float(ufl.as_ufl(network._past(state | {"pace": ufl.as_ufl(2.0)}, ufl.as_ufl(s / 2.0))[2])(()))
+        assert 0 <= s * p / (1 + p) <= 1
+        assert s > 2 or p == pytest.approx(s / (1 + s))                        # BDF2 of second order
+
+
 def test_viscosity_in_steady_extension():
     """The stress of a branch converges to 3 mu tau rate (uniaxial) and 6 mu tau rate (equibiaxial), at any rate."""
     for rate in (0.1, 5.0):
