@@ -10,6 +10,7 @@ from .sheet import circle, rectangle, sheet
 from .solid_tool import SolidTool, Swept, box, extruded, revolved
 from .surface import Surface
 from .triangulated import solid
+from .union import Union, union
 
 
 class _StoredFileTool(SolidTool):
@@ -24,9 +25,13 @@ class _StoredFileTool(SolidTool):
 
 def _tool(shape: dict[str, Any]) -> SolidTool:
     """Return a tool from the data of a checkpoint, {attribute of the tool: value}, such as {"name": "mould.stl"}."""
-    if "profile" not in shape:
-        return _StoredFileTool(shape["name"])
-    return Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])
+    if "parts" in shape:
+        found: SolidTool = Union([_tool(part) for part in shape["parts"]], shape["names"])
+    elif "profile" in shape:
+        found = Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])
+    else:
+        found = _StoredFileTool(shape["name"])
+    return found.moved(*shape.get("shift", (0.0, 0.0, 0.0)))
 
 
 ThreeD.formulation = Surface

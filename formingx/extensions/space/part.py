@@ -13,6 +13,7 @@ from ...results.files.column_table import ColumnTable
 from ...results.numbers import PartNumbers
 from ...scene.symmetry import MirrorPlanes
 from ...units import NONE, Units
+from .union import Union
 from .wall import SheetWall
 
 
@@ -128,20 +129,27 @@ class SheetFilling(ColumnTable):
             in each state, shape (n,).
         gap: largest distance of the sheet from the tool in each state, shape (n,), length.
         comm: MPI communicator of the run.
+        parts: for each part of a `fx.tools.union` its name, with two arrays: the share of the reference area that
+            touches this part, shape (n,); the force of the modelled sheet on it, shape (n, 3), stress length^2.
     """
 
     control: tuple[str, np.ndarray]
     touching: np.ndarray
     gap: np.ndarray
     comm: Any
+    parts: dict[str, tuple[np.ndarray, np.ndarray]] = field(default_factory=dict)
 
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """Columns of the table, with a row for each state: {name: values, shape (n,)}.
 
-        They are the first column of the run, such as "pressure", then "touching" and "gap", the attributes.
+        They are the first column of the run, such as "pressure", then "touching" and "gap", the attributes. Of a part
+        "rib" of a union there are "touching_rib", and the force on it along z, "rib_force".
         """
-        return {self.control[0]: self.control[1], "touching": self.touching, "gap": self.gap}
+        found = {self.control[0]: self.control[1], "touching": self.touching, "gap": self.gap}
+        for name, (touching, force) in self.parts.items():
+            found |= {f"touching_{name}": touching, f"{name}_force": force[:, 2]}
+        return found
 
 
 def filling(path: Any, contact: Any) -> SheetFilling:
@@ -156,14 +164,26 @@ def filling(path: Any, contact: Any) -> SheetFilling:
         the tool.
     """
     rows, comm = [], path.problem.comm
+    tool = contact.contact.tool
+    names = tool.names if isinstance(tool, Union) else []
     for state in path.states:
         with path.problem.state_context(state) as problem:
-            d = contact.contact.tool.signed_distance(contact.positions(problem.x.array_r, state.control))
-            closed = contact.touching(problem.x.array_r, state.control) | (d > -0.1 * contact.thickness)
+            fields = problem.x.array_r
+            x = contact.positions(fields, state.control)
+            d = tool.signed_distance(x)
+            closed = contact.touching(fields, state.control) | (d > -0.1 * contact.thickness)
+            forces = contact.area[:, None] * contact.tractions(fields, state.control).force if names else None
         area = contact.rule.area
-        parts = comm.allgather((float(area[closed].sum()), float(area.sum()), float((-d).max(initial=0.0))))
-        touching, whole, gap = (list(column) for column in zip(*parts))
-        rows.append((sum(touching) / sum(whole), max(gap)))
+        nearest = tool.nearest_parts(x) if names else None
+        shares = [np.append(area[closed & (nearest == k)].sum(), forces[nearest == k].sum(0))
+                  for k in range(len(names))]
+        parts = comm.allgather((np.array([area[closed].sum(), area.sum(), *np.ravel(shares)]),
+                                float((-d).max(initial=0.0))))
+        total = np.sum([sums for sums, _ in parts], axis=0)
+        each = total[2:].reshape(-1, 4) / [total[1], 1.0, 1.0, 1.0]
+        rows.append([total[0] / total[1], max(gap for _, gap in parts), *each.ravel()])
+    table = np.array(rows)
+    each = table[:, 2:].reshape(len(table), -1, 4)
     name = path.columns[0]
-    touched, gaps = np.array(rows).T
-    return SheetFilling((name, path[name]), touched, gaps, comm)
+    return SheetFilling((name, path[name]), table[:, 0], table[:, 1], comm,
+                        {part: (each[:, k, 0], each[:, k, 1:]) for k, part in enumerate(names)})

@@ -1,0 +1,58 @@
+"""Tools that are made of several parts: one contact, distances, filling and forces by part."""
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx.contact.tooling import tool_of
+from formingx.results.files.description import plain
+
+HELD = [fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")]
+BOX = fx.tools.box(half=(1.0, 1.4), depth=0.6, corner=0.4, fillet=0.3, lip=0.1)
+RIB = fx.tools.extruded(fx.Tool([(0.3, -0.7), (0.1, -0.3), (-0.1, -0.3), (-0.3, -0.7)], [0.0, 0.08, 0.08, 0.0]), "x")
+
+
+def form(friction):
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(2.0, 2.8, corner=0.4, part="quarter"), size=0.13)
+    tool = fx.tools.union(BOX, RIB, names=["box", "rib"])
+    scene = fx.Scene(mesh=sheet, thickness=0.02, materials=fx.NeoHookean(c10=1.0), supports=HELD,
+                     loads=[fx.Pressure("top")], model=fx.Membrane(wrinkles=0.01),
+                     contacts=[fx.Contact("bottom", tool, friction, name="mould")])
+    return fx.trace(scene, until=fx.pressure(0.3), progress=False), tool
+
+
+def test_distance_to_parts_is_the_nearest(tmp_path):
+    tool, x = fx.tools.union(BOX, RIB.moved(z=0.1)).moved(x=0.2), np.random.default_rng(2).uniform(-1, 1, (500, 3))
+    apart = [BOX.moved(x=0.2), RIB.moved(x=0.2, z=0.1)]
+    each = [part.distances(x) for part in apart]
+    found = tool.distances(x)
+    np.testing.assert_allclose(found.distance, np.maximum(each[0].distance, each[1].distance), atol=1e-14)
+    nearest = np.argmax([part.distance for part in each], axis=0)
+    np.testing.assert_array_equal(tool.nearest_parts(x), nearest)
+    np.testing.assert_allclose(found.normal, np.where(nearest[:, None] == 0, each[0].normal, each[1].normal))
+    assert len(set(nearest)) == 2 and tool.names == ["part 1", "part 2"]
+    np.testing.assert_allclose(tool_of(plain(tool)).signed_distance(x), tool.signed_distance(x), atol=1e-14)
+    points, triangles = tool.surface()
+    assert len(points) == sum(len(part.surface()[0]) for part in apart) and triangles.max() == len(points) - 1
+
+
+@pytest.mark.parametrize("parts, options, text", [
+    ([BOX], {}, "1 parts"), ([BOX, fx.tools.plane(0.0)], {}, "a tool in three dimensions"),
+    ([BOX, RIB], {"names": ["a"]}, "one for each of the 2"), ([BOX, RIB], {"names": ["a", "a"]}, "each another")])
+def test_unions_that_are_refused(parts, options, text):
+    with pytest.raises(fx.InputError, match=text):
+        fx.tools.union(*parts, **options)
+
+
+@pytest.mark.parametrize("friction", ["stick", 0.2, pytest.param("none", marks=pytest.mark.thorough)])
+def test_no_point_of_the_sheet_lies_inside_a_part(friction):
+    """Of two contacts with one face, one would hold the points that the other should stop."""
+    path, tool = form(friction)
+    deepest = tool.signed_distance(path.wall().deformed_points).max()
+    assert deepest < 1e-3 and tool.nearest_parts(path.wall().deformed_points).any()
+    filling = path.filling("mould")
+    box, rib = (filling.parts[name] for name in ("box", "rib"))
+    np.testing.assert_allclose(box[0] + rib[0], filling.touching, atol=1e-12)
+    assert rib[0][-1] > 0.03 and filling.gap[-1] < 0.1
+    np.testing.assert_allclose(4 * (box[1] + rib[1])[-1, 2], path["tool_force"][-1], rtol=1e-8)
+    assert filling.columns["rib_force"][-1] < 0
