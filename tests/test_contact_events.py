@@ -170,6 +170,7 @@ def test_no_events_are_predicted_without_stick(friction):
     assert not path.problem.limit.predicts_events and path.counts.failures < 0.2 * path.counts.steps
 
 
+@pytest.mark.thorough
 def test_the_core_without_contact_events(tmp_path):
     """Without the folder the package is imported, and a stuck cup takes a step a gap closure to the same walls."""
     file, steps, *walls = run_without(tmp_path, ["contact_events"], "-c", WITHOUT).split()

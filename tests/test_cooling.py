@@ -159,6 +159,7 @@ def test_a_restarted_run_equals_an_uninterrupted_one(tmp_path):
         assert told(again) == pytest.approx(told(whole), rel=1e-9)
 
 
+@pytest.mark.thorough
 def test_saved_temperatures_belong_to_their_points():
     """Of the body and of a conducting tool: rows in another order are found, and moved points are refused."""
     history = Problem(pressed()).histories[-1]

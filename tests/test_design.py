@@ -265,6 +265,7 @@ def test_runs_of_designs_do_not_change_the_scene():
     assert mould.nodes_per_step is None and not run.path.problem.limit.predicts_events
 
 
+@pytest.mark.thorough
 def test_a_stage_that_waits_ends_where_its_target_is_met():
     """Of a sheet that creeps under its weight, the derivative of the time to a given sag agrees with differences."""
     creeps = fx.TransientNetwork(fx.NeoHookean(c10=1e-6), [(1.0, 2.0)])
@@ -300,6 +301,7 @@ def test_spread_and_table():
         run.spread({"mu": 0.1})
 
 
+@pytest.mark.thorough
 def test_covariance_of_a_fit():
     """Standard deviations use the covariance of correlated constants of a fit, and add an independent thickness.
 

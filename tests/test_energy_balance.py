@@ -195,6 +195,7 @@ def test_friction_is_traction_over_slip(done):
     assert path.work()["friction"][-1] == pytest.approx(rubbed(path), rel=0.06)
 
 
+@pytest.mark.thorough
 def test_loss_in_branches_is_that_of_small_steps(done):
     path = done.setdefault("relaxing bar", RUNS["relaxing bar"]())
     power, time = path["dissipated_power"], path["process_time"]
@@ -265,6 +266,7 @@ def test_polynomials_of_a_step(start, end):
     assert step_polynomials.integral(y, y) == pytest.approx((4.0**2 - 1.0**2) / 2, rel=1e-14)
 
 
+@pytest.mark.thorough
 def test_a_slow_plug_in_a_relaxing_sheet(caplog):
     """Tangents of the force go forwards in time: a process 10^8 times slower than the fastest branch has a balance."""
     mesh = fx.mesh.disc(radius=27.0, thickness=0.9, elements=(16, 1))

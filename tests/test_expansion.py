@@ -40,6 +40,7 @@ def test_a_free_sheet_that_cools_shrinks_without_stress(law, space):
     assert abs(path.last.measures["mass_error"]) < 1e-10 and path.last.measures["volume_error"] < 1e-10
 
 
+@pytest.mark.thorough
 def test_a_free_sheet_that_cools_in_time_shrinks_as_it_cools():
     """Faces held at 20 C: when heat has gone, J = J_T(20), and a relaxing material has no stress either."""
     material = fx.Viscoelastic(fx.NeoHookean(c10=1.0), [(1.0, 5.0)])

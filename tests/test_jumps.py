@@ -236,6 +236,7 @@ def test_a_sheet_without_friction_snaps_off_an_edge_too():
     assert path.jumps[0].measures["travel"] == pytest.approx(3.08, abs=0.05)
 
 
+@pytest.mark.thorough
 def test_a_nearly_singular_sheet_is_in_equilibrium_after_two_snaps():
     """On a rough plug, at 8.80 and 8.82 as with steps of 0.01. With looser viscous solutions it snaps 16 times."""
     made = plugs.scene(RADIUS, THICKNESS, PLUG, 0.35, fx.NeoHookean(c10=C10), "stick", (60, 2))

@@ -74,6 +74,7 @@ def test_stress_and_tangent_of_the_memory_integral(name):
         assert D[:, j] == pytest.approx((stress(C + by)[0] - stress(C - by)[0]) / 2e-6, rel=1e-5, abs=1e-8)
 
 
+@pytest.mark.thorough
 def test_a_trial_state_far_back_in_time_raises_no_warning():
     path = fx.Process(block(fx.KBKZ([(0.1, 1e-6), (0.02, 1.0)]))).run(
         [fx.Stage("pull", control="grip", until=fx.travel(0.1), duration=0.1)], progress=False, accuracy="draft")
@@ -132,6 +133,7 @@ def test_a_step_of_strain(name):
         path.work()
 
 
+@pytest.mark.thorough
 def test_temperature_shifts_its_times():
     """A body that is warmer by a decade of aT is one whose times are a tenth."""
     shift = fx.WLF(17.44, 51.6, 100.0)
@@ -189,6 +191,7 @@ def test_ranks_agree():
     assert other == pytest.approx(serial, rel=1e-8)
 
 
+@pytest.mark.thorough
 def test_kbkz_demo_quick(tmp_path):
     """Blocks within 0.2 % of the integrals, by a quadrature of this test's own; keys; discs against finer runs."""
     run("demos/kbkz.py", "--out", tmp_path, "--quick")
@@ -226,6 +229,7 @@ def test_rupture_stretch_is_the_maximum_of_the_sudden_stress():
     assert fx.KBKZ(SPECTRUM).rupture_stretch("equibiaxial") == np.inf
 
 
+@pytest.mark.thorough
 def test_a_solidified_melt_keeps_its_stress():
     """`Solidification` over K-BKZ: the glass holds what the melt pulls with when it is let go."""
     l, melt, G = 1.5, fx.KBKZ(SPECTRUM, DAMPINGS["wagner"]), 100.0
@@ -272,6 +276,7 @@ def ruptures(volume):
     return scene, fx.Stage("blow", control="air", amplitudes={fx.enclosed_volume: [(0.0, 0.0), (0.5, volume)]})
 
 
+@pytest.mark.thorough
 def test_rupture_of_a_damped_melt_is_reported():
     """The run ends at the axis, in words; check has said so before; not of a mild draw, nor without damping."""
     scene, stage = ruptures(3.5)

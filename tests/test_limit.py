@@ -24,6 +24,7 @@ def test_importing_loads_no_optional_modules():
     assert {"gmsh", "matplotlib", "plotly", "pyvista", "scipy", "tqdm"}.isdisjoint(loaded)
 
 
+@pytest.mark.thorough
 def test_a_picture_does_not_load_pyplot():
     """PyVista imports it for charts, which are drawn nonetheless."""
     code = """import sys
@@ -121,6 +122,7 @@ def test_internal_variables_are_computed_four_times_per_step(monkeypatch):
             np.testing.assert_array_equal(values, last.history_variables[0].values[name])
 
 
+@pytest.mark.thorough
 def test_peers_measures_what_is_there(tmp_path):
     printed = run("benchmarks/peers.py", "--codes", "formingx", "--only", "treloar", "--sizes", "10x1", "20x1",
                   "--repeat", "1", "--out", tmp_path)

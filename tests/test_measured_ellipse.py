@@ -47,6 +47,7 @@ def check(found):
     assert found["change_by_law"]["power_0.6"]["e1"] > found["change_by_law"]["power_0.8"]["e1"]
 
 
+@pytest.mark.thorough
 def test_measured_ellipse_quick(tmp_path):
     run("demos/measured_ellipse.py", "--quick", "--out", tmp_path)
     found = json.loads((tmp_path / "summary.json").read_text())

@@ -320,6 +320,7 @@ STAGES = [plug("down", 1.0, intermediate=[fx.travel(0.5)]), Stage("gone", inacti
           plug("home", -4.0, inactive=["plug"]), plug("again", -1.5)]
 
 
+@pytest.mark.thorough
 def test_a_process_continues_from_any_state():
     """From every state whose step was complete, as plain data: the same states follow."""
     whole = run(plugged("stick"), *STAGES)

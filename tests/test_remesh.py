@@ -265,9 +265,10 @@ def twice(monkeypatch, **after):
 
 RELAX = [fx.Viscoelastic(fx.NeoHookean(c10=0.2), [(1.0, 0.3)]),
          pytest.param(fx.TransientNetwork(fx.NeoHookean(c10=0.2), [(1.0, 0.3)]), marks=pytest.mark.slow),
-         pytest.param(fx.KBKZ([(1.0, 0.3), (0.5, 3.0)], damping=fx.PSM(10.0, 0.5)), marks=pytest.mark.thorough)]
+         fx.KBKZ([(1.0, 0.3), (0.5, 3.0)], damping=fx.PSM(10.0, 0.5))]
 
 
+@pytest.mark.thorough
 @pytest.mark.parametrize("material", RELAX, ids=lambda one: type(one).__name__)
 def test_internal_variables_are_transferred_to_new_meshes(monkeypatch, tmp_path, material):
     """A thick tube, blown up and left to creep: as without new meshes in both stages; and so after a kill."""

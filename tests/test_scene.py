@@ -31,6 +31,7 @@ def contents(thing, seen=None):
     return thing
 
 
+@pytest.mark.thorough
 def test_a_run_does_not_change_its_scene():
     """A process with friction by temperature, heat, relaxation and expansion leaves its scene unchanged."""
     scene = pressed()

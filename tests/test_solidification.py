@@ -38,6 +38,7 @@ def balance(G, drawn_to, mu=2.0, phi=1.0):
     return brentq(lambda l: mu * (l**2 - l**-4) + phi * G * ((l / drawn_to)**2 - (l / drawn_to)**-4), 1, drawn_to)
 
 
+@pytest.mark.thorough
 def test_solidified_block(tmp_path):
     """The stretch agrees to 1e-8 with the balance of rubber and glass, in fewer than 25 steps."""
     run("demos/set_block.py", "--out", tmp_path, "--quick")
@@ -78,6 +79,7 @@ def test_melted_material_carries_no_stress(hot, left):
         assert stress == pytest.approx((2 + share * G) * (l**2 - l**-4) * np.ones(len(stress)), rel=2e-4)
 
 
+@pytest.mark.thorough
 def test_steps_in_time_keep_the_accuracy():
     """A loaded block, whose base stiffens and contracts on cooling, until glass stops it."""
     stiffens = fx.NeoHookean(c10=fx.table({20: 4.0, 80: 1.5, 150: 1.0}))

@@ -142,7 +142,7 @@ def chilled():
 
 
 @pytest.mark.parametrize("name", [
-    "stiffens", "sets", pytest.param("relaxes and sets", marks=pytest.mark.thorough)])
+    "stiffens", *(pytest.param(name, marks=pytest.mark.thorough) for name in ("sets", "relaxes and sets"))])
 def test_faces_of_a_warm_part_may_be_chilled_at_once(chilled, name):
     """What stiffens or sets as the faces go to 20 C: elastic parts go to their free size, set ones keep their shape."""
     path = chilled(name)

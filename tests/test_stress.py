@@ -178,6 +178,7 @@ def test_traction_is_continuous_across_interfaces_and_pressure_is_not(stack):
         assert jump == pytest.approx(2 / 3 * (membrane[0] - membrane[1]), rel=5e-3)
 
 
+@pytest.mark.thorough
 def test_quadrature_points_of_a_layer(stack):
     """As many as the rule has, all inside the layer; projected and raw stresses agree on average."""
     raw = stack.stress().at_quadrature_points("c")
