@@ -344,3 +344,30 @@ def test_material_report_is_one_page(tmp_path, material, options, words):
     if options:
         with pytest.raises(fx.InputError, match="depend on the temperature: give temperatures"):
             material.report(tmp_path / "card.html")
+
+
+OWN_LAWS = {
+    "Alexander": lambda I1, I2: 0.3 * (I1 - 3) + 0.3 * ufl.ln((I2 - 3 + 0.2) / 0.2),
+    "saturating": lambda I1, I2: 0.3 * (I1 - 3) + 0.02 * (1 - ufl.exp(-12 * (I2 - 3))),
+    "small power of I1": lambda I1, I2: 0.5 * (I1 - 3 + 0.4) ** 0.5 + 0.1 * (I2 - 3),
+    "stiff in volume": lambda I1, I2: 0.3 * (I1 - 3) + 0.05 * (I2 - 3),
+}
+
+
+@pytest.mark.parametrize("name", OWN_LAWS)
+def test_own_laws_of_invariants_run_as_solids(name):
+    """The pressure of a thick sphere is that of the closed form, also of laws that do not resist a volume change."""
+    from scipy.integrate import quad
+    material = fx.Hyperelastic(OWN_LAWS[name])
+    assert material._isochoric is (name != "stiff in volume")
+    mesh = fx.mesh.sphere(inner_radius=1.0, thickness=0.5, elements=(6, 2))
+    scene = fx.Scene(mesh=mesh, materials=material, loads=[fx.Pressure("inner")],
+                     supports=[fx.Symmetry("axis"), fx.Symmetry("equator", "z")])
+    path = fx.trace(scene, until=fx.displacement(1.0, at=(0.0, 1.0)), progress=False)
+
+    def slope(R):
+        """dp/dR, from the Kirchhoff stress of an equibiaxial stretch r/R, with r^3 = R^3 + 7."""
+        r = (R**3 + 7) ** (1 / 3)
+        return 2 * material.stress("equibiaxial", r / R) * r / R * R**2 / r**3
+    exact, _ = quad(slope, 1.0, 1.5)
+    assert path["pressure"][-1] == pytest.approx(exact, rel=1e-3)

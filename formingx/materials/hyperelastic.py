@@ -1,16 +1,19 @@
 """Hyperelastic materials, and user-defined energies."""
 
+import functools
 import inspect
 import itertools
 import math
 from collections.abc import Callable
 from typing import Any
 
+import numpy as np
 import ufl
 
 from ..errors import InputError, count, finite, positive
 from ..physics import kinematics
 from .constants import varying
+from .homogeneous import Response
 from .material import Material
 
 
@@ -314,7 +317,14 @@ class Ogden(Material):
 
 
 class Hyperelastic(Material):
-    """Material with a user-defined energy, a function of the invariants or of F.
+    r"""Material with a user-defined energy, a function of the invariants or of F.
+
+    With :math:`W_i = \partial W / \partial I_i`, a solid without volume term resists a change of its volume by
+
+    .. math:: K = 12 W_1 + 48 W_2 + 36 W_{11} + 144 (W_{12} + W_{22})
+
+    in the reference configuration. If K is negative, the energy is taken at :math:`J^{-1/3} F` in place of F. At
+    constant volume both are equal.
 
     Args:
         energy: function `energy(I1, I2, **constants)` or `energy(F, **constants)` that returns the strain energy per
@@ -350,6 +360,23 @@ class Hyperelastic(Material):
         self.check()
 
     def strain_energy(self, F, **constants):
+        return self._energy_of(kinematics.volume_ratio(F) ** (-1 / 3) * F if self._isochoric else F, constants)
+
+    @property
+    def _isochoric(self) -> bool:
+        """True if the energy is taken at constant volume: by itself it does not resist a change of the volume."""
+        if self.varies:
+            return True
+        first, second = self._own_response.derivatives(np.ones((3, 1)), self._numbers())
+        return bool(first.sum() + second.sum() < 0)
+
+    @functools.cached_property
+    def _own_response(self) -> Response:
+        """Derivatives of the energy as the user gave it."""
+        return Response(lambda F, **constants: self._energy_of(F, constants), list(self.parameters))
+
+    def _energy_of(self, F: Any, constants: dict[str, Any]) -> Any:
+        """Return the energy that the user gave, at a deformation gradient F (UFL, shape (3, 3)), as a UFL scalar."""
         arguments = kinematics.invariants(F) if self._of == "invariants" else (F,)
         try:
             energy = ufl.as_ufl(self._energy(*arguments, **constants))
