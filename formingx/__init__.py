@@ -89,12 +89,12 @@ with _optional():
 with _optional():
     from .extensions.fits.fit_damping import Spectrum, fit_spectrum
 with _optional():
-    from .extensions.space import SolidTool, box, circle, extruded, rectangle, revolved, sheet, solid, union
     from .extensions.space import checks as _space_checks
     from .extensions.space import mould_checks as _mould_checks
-    _add(mesh, circle, rectangle, sheet)
-    _add(tools, SolidTool, box, extruded, revolved, solid, union)
-    del circle, rectangle, sheet, SolidTool, box, extruded, revolved, solid, union
+    from .extensions.space.names import MESHES, TOOLS
+    _add(mesh, *MESHES)
+    _add(tools, *TOOLS)
+    del MESHES, TOOLS
 with _optional():
     from .extensions.adapt import adapted
     _add(mesh, adapted)

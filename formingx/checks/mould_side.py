@@ -80,11 +80,10 @@ def _covers_face(scene: Scene, contact: Contact) -> bool:
     opposite = _OPPOSITE.get(contact.on)
     if opposite is None or opposite not in scene.mesh.boundaries:
         return False
-    points = np.unique(scene.mesh.nodes_of(contact.on), axis=0)
     if scene.kinematics.components == 3:
-        points = np.column_stack([points, np.zeros((len(points), 3 - points.shape[1]))])
-        directions = np.tile([0.0, 0.0, 1.0 if contact.on == "top" else -1.0], (len(points), 1))
+        points, directions = scene.mesh.outward(contact.on)
     else:
+        points = np.unique(scene.mesh.nodes_of(contact.on), axis=0)
         points, directions = outward_directions(points, scene.mesh.nodes_of(opposite))
     if not len(points):
         return False

@@ -36,7 +36,7 @@ def _edges(body: Body) -> Iterator[Finding]:
     """
     if body.scene.kinematics.components == 3:
         supported = {support.on for support in body.scene.supports}
-        for name in sorted({*body.scene.mesh.boundaries} - {"bottom", "top"} - supported):
+        for name in sorted({*body.scene.mesh.boundaries} - {*body.scene.mesh.faces} - supported):
             yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: a symmetry cut"
                           f" (part='quarter') needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
 

@@ -98,8 +98,10 @@ class MaterialTerms:
         found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.state_transfer
 
         def values(X: np.ndarray) -> np.ndarray:
-            R, Z = X[:2] if brought is None else brought.original_positions(X[:2].T).T
-            return function(R, self.forms.mid(layer, R, Z))
+            X = X[:self.forms.domain.geometry.dim]
+            R, *others = X if brought is None else brought.original_positions(X.T).T
+            others[0] = self.forms.mid(layer, R, others[0])
+            return function(R, *others)
         found.interpolate(values, self.cells)
         return found
 

@@ -18,7 +18,7 @@ import ufl
 
 from .. import _compat
 from ..errors import InputError, check_name, finite, values
-from ..mesh.nodes import axes
+from ..mesh.nodes import arguments, axes
 from ..values.table import Table
 from ..values.temperature import ABSOLUTE_ZERO, FunctionOfTemperature
 
@@ -89,20 +89,23 @@ class OfPosition(Varying):
     def __init__(self, function: Callable):
         self.function = function
 
-    def __call__(self, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return the constant at reference positions (R, Z), checked to be finite.
+    def __call__(self, *coordinates: np.ndarray) -> np.ndarray:
+        """Return the constant at reference positions, checked to be finite.
 
         Args:
-            R: first coordinates, shape (n,), length.
-            Z: second coordinates, shape (n,), length.
+            coordinates: R and Z, in three dimensions x, y and z, shape (n,) each, length.
 
         Returns:
             Values, shape (n,).
         """
-        return values(f"the constant {self!r}", self.function, {"R": R, "Z": Z})
+        return self.at(dict(zip("RZ" if len(coordinates) == 2 else "xyz", coordinates)))
+
+    def at(self, coordinates: dict[str, np.ndarray]) -> np.ndarray:
+        """Return the constant at reference positions given as {name of a coordinate: values, shape (n,), length}."""
+        return values(f"the constant {self!r}", self.function, arguments(self.function, coordinates))
 
     def values(self, sample):
-        return values(f"the constant {self!r}", self.function, dict(zip(axes(sample.domain), sample.points.T)))
+        return self.at(dict(zip(axes(sample.domain), sample.points.T)))
 
     def expression(self, fields):
         return fields.position_coefficient(self)

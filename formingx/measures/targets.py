@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import ufl
 
-from ..errors import InputError, check_name, finite, pair, positive
+from ..errors import InputError, check_name, finite, pair, positive, triple
 from ..forms.probes import probe
 from .quantities import Form, Linear, Quantity, Sag, WholePartQuantity
 
@@ -258,13 +258,13 @@ def enclosed_volume(value: float) -> Target:
     return Target("enclosed_volume", finite("enclosed_volume", value), bind_volume)
 
 
-def displacement(value: float, *, at: tuple[float, float], component: str = "z") -> Target:
+def displacement(value: float, *, at: tuple[float, ...], component: str = "z") -> Target:
     """Return the target that a displacement component of a material point reaches a value.
 
     Args:
         value: the displacement, length.
-        at: position of the point in the reference configuration, (R, Z), for a sheet in three dimensions (x, y),
-            length.
+        at: position of the point in the reference configuration, length: (R, Z), for a flat sheet in three dimensions
+            (x, y), for another surface (x, y, z) of a node or of a point of a triangle.
         component: "r" or "z"; in three dimensions "x", "y" or "z".
 
     Returns:
@@ -276,7 +276,7 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
     >>> fx.displacement(3.0, at=(5.0, 0.0)).name
     'u_z_at_5_0'
     """
-    at = pair("displacement: at", at)
+    at = triple("displacement: at", at) if np.size(at) == 3 else pair("displacement: at", at)
     if not isinstance(component, str) or component not in ("r", "z", "x", "y"):
         raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z' (in three dimensions"
                          " 'x', 'y' or 'z')")
@@ -285,7 +285,7 @@ def displacement(value: float, *, at: tuple[float, float], component: str = "z")
         axes = problem.scene.kinematics.axes
         check_name("displacement: component", component, axes)
         return _displacement(problem, [at], [[float(axis == component) for axis in axes]])
-    return Target(f"u_{component}_at_{at[0]:g}_{at[1]:g}", finite("displacement", value), bind)
+    return Target(f"u_{component}_at_{'_'.join(f'{v:g}' for v in at)}", finite("displacement", value), bind)
 
 
 def sag(value: float) -> Target:

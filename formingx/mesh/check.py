@@ -26,7 +26,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     """
     bad = np.flatnonzero(~np.isfinite(points).all(1))
     if len(bad):
-        raise InputError(f"{what}: a node has the coordinates {_show(points[bad[0]])}: must be finite numbers")
+        raise InputError(f"{what}: a node has the coordinates {show(points[bad[0]])}: must be finite numbers")
     size = float(np.ptp(points, axis=0).max())
     if not 1 / FAR < size < FAR or np.abs(points).max() > FAR:
         raise InputError(f"{what}: it is {size:.3g} large: must be between {1 / FAR:g} and {FAR:g}")
@@ -35,26 +35,26 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(1) for i in range(3)], axis=0)
     flat = np.abs(area) <= ROUND_OFF * longest
     if flat.any():
-        raise InputError(f"{what}: {flat.sum()} elements are flat, one at {_show(corners[flat][0].mean(0))}")
+        raise InputError(f"{what}: {flat.sum()} elements are flat, one at {show(corners[flat][0].mean(0))}")
     inside_out = inverted(points[triangles])
     if inside_out.any():
         raise InputError(f"{what}: {inside_out.sum()} elements are turned inside out, one at"
-                         f" {_show(corners[inside_out][0].mean(0))}: a node is out of place, or a curved edge bent too"
+                         f" {show(corners[inside_out][0].mean(0))}: a node is out of place, or a curved edge bent too"
                          f" much for them: use smaller elements there")
     _check_middles(points, triangles, what)
     outline = _outline(points, triangles[:, :3], np.sign(area), what)
     place = crossing_point(points, outline)
     if place is not None:
-        raise InputError(f"{what}: the body touches or crosses itself near {_show(place)}: elements that meet share"
+        raise InputError(f"{what}: the body touches or crosses itself near {show(place)}: elements that meet share"
                          f" their nodes, and none may lie over another")
-    piece = _pieces(triangles[:, :3])
+    piece = connected_pieces(triangles[:, :3])
     if piece.max() > 0:
-        first, other = (_show(corners[np.argmax(piece == k)].mean(0)) for k in (0, piece.max()))
+        first, other = (show(corners[np.argmax(piece == k)].mean(0)) for k in (0, piece.max()))
         raise InputError(f"{what}: the body is in pieces: no elements lead from {first} to {other}; bodies apart need a"
                          f" scene each")
 
 
-def _pieces(triangles: np.ndarray) -> np.ndarray:
+def connected_pieces(triangles: np.ndarray) -> np.ndarray:
     """Return a number for each triangle that is equal within a connected piece of the body, shape (m,).
 
     triangles: node numbers of the corners, shape (m, 3). The number is 0 for the piece with the lowest node number.
@@ -88,11 +88,11 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     edges, middles = np.unique(rows[:, :2], axis=0, return_counts=True)
     middle, owners = np.unique(rows[:, 2], return_counts=True)
     if np.any(middles > 1):
-        raise InputError(f"{what}: the edge at {_show(points[edges[middles > 1][0]].mean(0))} has two middle nodes:"
+        raise InputError(f"{what}: the edge at {show(points[edges[middles > 1][0]].mean(0))} has two middle nodes:"
                          f" elements that meet share all three nodes of their edge")
     wrong = (owners > 1) | np.isin(middle, triangles[:, :3])
     if np.any(wrong):
-        raise InputError(f"{what}: the node at {_show(points[middle[wrong][0]])} is the middle of an edge, and of"
+        raise InputError(f"{what}: the node at {show(points[middle[wrong][0]])} is the middle of an edge, and of"
                          f" another one too or a corner")
 
 
@@ -136,7 +136,7 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
     np.add.at(sides, numbers, side)
     overlaps = (times > 2) | (times == 2) & (sides != 0)
     if overlaps.any():
-        raise InputError(f"{what}: elements lie over each other at {_show(points[edges[overlaps][0]].mean(0))}: each"
+        raise InputError(f"{what}: elements lie over each other at {show(points[edges[overlaps][0]].mean(0))}: each"
                          f" edge must have one element on each side")
     return edges[times == 1]
 
@@ -180,6 +180,6 @@ def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     return u[..., 0] * v[..., 1] - u[..., 1] * v[..., 0]
 
 
-def _show(point: np.ndarray) -> str:
-    """Return a point, shape (2,), as text for messages."""
-    return f"(R, Z) = ({point[0]:.6g}, {point[1]:.6g})"
+def show(point: np.ndarray) -> str:
+    """Return a point, shape (2 or 3,), as text for messages."""
+    return f"{'(R, Z)' if len(point) == 2 else '(x, y, z)'} = ({', '.join(f'{v:.6g}' for v in point)})"

@@ -9,6 +9,7 @@ from mpi4py import MPI
 from .. import _compat
 from ..errors import InputError
 from .check import check_elements
+from .check_surface import check_surface
 from .mesh import Mesh
 from .nodes import facet_nodes, own_cells
 
@@ -21,7 +22,7 @@ class Grid(NamedTuple):
     """Mesh on one rank; `layers` and `boundaries` refer to rows of `points`.
 
     Attributes:
-        points: nodes (R, Z), shape (n, 2), length; in three dimensions (x, y, 0), shape (n, 3).
+        points: nodes (R, Z), shape (n, 2), length; in three dimensions (x, y, z), shape (n, 3).
         numbers: node numbers in a file, shape (n,).
         layers: {name: triangles, shape (m, 6)}: corners counter-clockwise, then middles of edges 01, 12, 20.
             First-order triangles have shape (m, 3).
@@ -75,13 +76,15 @@ def gathered(mesh: Mesh) -> Grid:
     cells = numbers[np.asarray(_compat.cell_nodes(domain))[:owned]]
     marks = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
     ends = {name: facet_nodes(domain, mesh.facets_of(name))[:, :2] for name in mesh.boundaries}
-    parts = comm.allgather((numbers, X[:, :2], {name: cells[found[found < owned]] for name, found in marks.items()},
+    parts = comm.allgather((numbers, X[:, :domain.geometry.dim], {name: cells[found[found < owned]] for name, found in marks.items()},
                             {name: numbers[found] for name, found in ends.items()}))
-    points = np.zeros((domain.geometry.index_map().size_global, 2))
+    points = np.zeros((domain.geometry.index_map().size_global, domain.geometry.dim))
     for number, x, _, _ in parts:
         points[number] = x
     layers = {name: np.concatenate([rows[name] for _, _, rows, _ in parts]) for name in mesh.layers}
-    layers = {name: counter_clockwise(points, rows[:, _FROM_DOLFINX[: rows.shape[1]]]) for name, rows in layers.items()}
+    layers = {name: rows[:, _FROM_DOLFINX[: rows.shape[1]]] for name, rows in layers.items()}
+    if points.shape[1] == 2:
+        layers = {name: counter_clockwise(points, rows) for name, rows in layers.items()}
     triangles = np.concatenate(list(layers.values()))
     edges = {frozenset(row[[i, j]].tolist()): row[[n for n in (i, j, k) if n < len(row)]]
              for row in triangles for i, j, k in _EDGES}
@@ -152,7 +155,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
     if np.any(same > 1):
         raise InputError(f"{what}: {np.sum(same > 1)} elements belong to more than one layer, or are there twice;"
                          f" layers are {', '.join(map(repr, grid.layers))}")
-    check_elements(points[:, :2], triangles, what)
+    (check_elements if points.shape[1] == 2 else check_surface)(points, triangles, what)
     layers = {name: tag for tag, name in enumerate(grid.layers, 1)}
     cell_tags = np.repeat(np.arange(1, len(layers) + 1), [len(rows) for rows in grid.layers.values()])
     width = 3 if triangles.shape[1] == 6 else 2
@@ -207,6 +210,6 @@ def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], c
     found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in pairs if (min(a, b), max(a, b)) in known]
     if found and len(found) < len(edges):
         bad = next(pair for pair in pairs if (min(pair), max(pair)) not in known)
-        position = [f"({points[n, 0]:.6g}, {points[n, 1]:.6g})" if n >= 0 else "a node of no element" for n in bad]
+        position = [f"({', '.join(f'{v:.6g}' for v in points[n])})" if n >= 0 else "a node of no element" for n in bad]
         raise InputError(f"{caller}: its edge from {position[0]} to {position[1]} is not an edge of an element")
     return found

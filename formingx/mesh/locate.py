@@ -9,7 +9,7 @@ from mpi4py import MPI
 from .. import _compat
 from ..errors import InputError
 from ..values.tolerances import NEGLIGIBLE
-from .nodes import own_cells
+from .nodes import axes, own_cells
 
 
 class LocatedPoints(NamedTuple):
@@ -34,7 +34,7 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
 
     Args:
         mesh: the `dolfinx.mesh.Mesh`.
-        points: reference positions (R, Z), shape (n, 2), length, equal on all ranks.
+        points: reference positions (R, Z), or (x, y, z), shape (n, 2 or 3), length, equal on all ranks.
         size: extent of the mesh, length.
         cells: local numbers of the cells to be searched; None: all.
         within: name of these cells in the error message.
@@ -49,7 +49,7 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
     nodes, owned = _compat.cell_nodes(mesh), own_cells(mesh)
     cells = owned if cells is None else cells[cells < len(owned)]
     padded = np.zeros((len(points), 3))
-    padded[:, :2] = points
+    padded[:, :points.shape[1]] = points
     found = np.full(len(points), -1)
     reference = np.zeros((len(points), dim))
     depth = np.full(len(points), -NEGLIGIBLE)
@@ -63,13 +63,16 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
                 except RuntimeError:                 # the point is far from a curved cell
                     continue
                 inside = min(*place, 1 - place.sum())
+                if dim < mesh.geometry.dim:                  # a surface: the point may lie off the plane of the triangle
+                    away = np.linalg.norm(cmap.push_forward(place[None], X[nodes[cell]])[0] - point)
+                    inside = min(inside, -away / np.ptp(X[nodes[cell]], axis=0).max())
                 if inside > depth[i]:
                     found[i], reference[i], depth[i] = cell, place, inside
     best = np.empty_like(depth)
     comm.Allreduce(np.where(found >= 0, depth, -np.inf), best, MPI.MAX)
     if np.any(best == -np.inf):
-        r, z = points[np.argmax(best == -np.inf)]
-        raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not in the {within}")
+        at = ", ".join(f"{v:.6g}" for v in points[np.argmax(best == -np.inf)])
+        raise InputError(f"point ({', '.join(axes(mesh)[:points.shape[1]])}) = ({at}) is not in the {within}")
     ranks = np.where((found >= 0) & (depth == best), comm.rank, comm.size)
     owner = np.empty_like(ranks)
     comm.Allreduce(ranks, owner, MPI.MIN)

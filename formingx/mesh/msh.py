@@ -106,7 +106,7 @@ def read(file: str | os.PathLike) -> Grid:
 
     Raises:
         InputError: the file is missing or damaged. There is no physical group of dimension 2, an element is not a
-            triangle, or the body is not in a plane of constant z.
+            triangle, or six-node triangles are not in a plane of constant z.
     """
     file = os.fspath(file)
     found = content(file)
@@ -122,19 +122,22 @@ def read(file: str | os.PathLike) -> Grid:
     boundaries = _parts(found, 1, _LINES, found.numbers[sort], file)
     size = np.ptp(points[:, :2], axis=0).max(initial=0.0)
     body = points[np.concatenate([rows.ravel() for rows in layers.values()])]
-    if np.ptp(body[:, 2]) > 1e-9 * size:
+    in_space = np.ptp(body[:, 2]) > 1e-9 * size
+    if in_space and any(rows.shape[1] > 3 for rows in layers.values()):
         raise InputError(f"mesh file {file!r} is not a plane section: z goes from {body[:, 2].min():.6g} to"
-                         f" {body[:, 2].max():.6g}; x must be R, y Z, and z the same everywhere")
+                         f" {body[:, 2].max():.6g}; x must be R, y Z, and z the same everywhere; a surface in three"
+                         f" dimensions must have triangles of three nodes")
     used = np.unique(np.concatenate([found.numbers[sort][rows].ravel() for rows in layers.values()]))
     for block in found.blocks:
         if block.dim == 2 and not block.groups and np.isin(block.nodes, used).any():
             raise InputError(f"mesh file {file!r}: {len(block.nodes)} elements of surface {block.entity} are of no"
                              f" physical group, and part of the body: name their layer, or leave them out")
-    layers = {name: counter_clockwise(points[:, :2], rows) for name, rows in layers.items()}
+    if not in_space:
+        layers = {name: counter_clockwise(points[:, :2], rows) for name, rows in layers.items()}
     orders = {rows.shape[1] for rows in layers.values()}
     if len(orders) > 1:
         raise InputError(f"mesh file {file!r} has triangles of three and of six nodes: all must have the same number")
-    return Grid(points[:, :2].copy(), found.numbers[sort], layers, boundaries)
+    return Grid(points if in_space else points[:, :2].copy(), found.numbers[sort], layers, boundaries)
 
 
 def write(grid: Grid, file: str | os.PathLike) -> None:
@@ -146,7 +149,8 @@ def write(grid: Grid, file: str | os.PathLike) -> None:
     elements = [f"{kinds[dim, rows.shape[1]]} 2 {tag} {tag} {' '.join(map(str, row))}"
                 for tag, (dim, _, rows) in sorted(enumerate(parts, 1), key=lambda part: part[1][0])
                 for row in grid.numbers[rows].tolist()]
-    nodes = [f"{n} {float(r)!r} {float(z)!r} 0" for n, (r, z) in zip(grid.numbers.tolist(), grid.points, strict=True)]
+    nodes = [" ".join([str(n), *(repr(float(v)) for v in x), "0"][:4])
+             for n, x in zip(grid.numbers.tolist(), grid.points, strict=True)]
     lines = ["$MeshFormat", "2.2 0 8", "$EndMeshFormat",
              "$PhysicalNames", str(len(named)), *sorted(named, key=lambda line: line[0]), "$EndPhysicalNames",
              "$Nodes", str(len(nodes)), *nodes, "$EndNodes",

@@ -1,5 +1,7 @@
 """Nodes of cells and facets of a DOLFINx mesh, in reference coordinates."""
 
+import inspect
+from collections.abc import Callable, Mapping
 from typing import Any
 
 import numpy as np
@@ -14,12 +16,32 @@ SAME_PLACE = 1e-5
 MAX_COMPARED = 1_000_000
 """Number of pairs of points or boxes above which a tree finds the near ones."""
 COORDINATES = 2
-"""Number of reference coordinates of a point of the body: (R, Z); (x, y) of a sheet in three dimensions."""
+"""Number of reference coordinates of a point of a section: (R, Z)."""
 
 
 def axes(domain: Any) -> str:
-    """Return the names of the reference coordinates of a DOLFINx mesh: "RZ" for a section, "xy" in three dimensions."""
-    return "RZ" if domain.geometry.dim == 2 else "xy"
+    """Return the names of the reference coordinates of a DOLFINx mesh: "RZ", in three dimensions "xyz"."""
+    return "RZ" if domain.geometry.dim == 2 else "xyz"
+
+
+def arguments(function: Callable, coordinates: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Return the coordinates that a function of the reference position takes.
+
+    Args:
+        function: function of arrays (R, Z); in three dimensions of (x, y) or (x, y, z).
+        coordinates: {name: values, shape (n,), length} of all coordinates.
+
+    Returns:
+        {name: values} of the first coordinates, as many as the function has positional arguments without a default.
+    """
+    try:
+        taken = inspect.signature(function).parameters.values()
+    except (TypeError, ValueError):                         # a function of NumPy, for example, has no signature
+        taken = []
+    positional = [p for p in taken if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]
+    any_number = any(p.kind is p.VAR_POSITIONAL for p in taken)
+    least = COORDINATES if len([p for p in positional if p.default is p.empty]) <= COORDINATES else len(positional)
+    return dict(list(coordinates.items())[: len(coordinates) if any_number else least])
 
 
 def own_cells(domain: Any) -> np.ndarray:
@@ -28,8 +50,8 @@ def own_cells(domain: Any) -> np.ndarray:
 
 
 def node_positions(domain: Any) -> np.ndarray:
-    """Return the reference positions of the nodes of a DOLFINx mesh on this rank, shape (n, 2), length."""
-    return domain.geometry.x[:, :COORDINATES]
+    """Return the reference positions of the nodes of a DOLFINx mesh on this rank, shape (n, 2 or 3), length."""
+    return domain.geometry.x[:, :domain.geometry.dim]
 
 
 def span(domain: Any, comm: Any) -> np.ndarray:
@@ -40,16 +62,16 @@ def span(domain: Any, comm: Any) -> np.ndarray:
         comm: MPI communicator.
 
     Returns:
-        Lowest, then highest coordinates, shape (2, 2), length, equal on all ranks.
+        Lowest, then highest coordinates, shape (2, 2 or 3), length, equal on all ranks.
     """
     X = node_positions(domain)
-    return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(COORDINATES)]
+    return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(X.shape[1])]
                      for f, sign, op in ((np.min, -1, MPI.MIN), (np.max, 1, MPI.MAX))])
 
 
 def dof_positions(space: Any) -> np.ndarray:
-    """Return the reference positions of the (blocked) unknowns of a function space, shape (n, 2), length."""
-    return space.tabulate_dof_coordinates()[:, :COORDINATES]
+    """Return the reference positions of the (blocked) unknowns of a function space, shape (n, 2 or 3), length."""
+    return space.tabulate_dof_coordinates()[:, :space.mesh.geometry.dim]
 
 
 def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -13,25 +13,25 @@ class Place(NamedTuple):
     """Place of a point in a body, for messages.
 
     Attributes:
-        R: reference coordinate R, length.
-        Z: reference coordinate Z, length.
+        position: reference coordinates (R, Z), in three dimensions (x, y, z), length.
         layer: name of the layer, "" if unknown.
         boundary: name of the nearest boundary, "" for a mesh without boundaries.
         distance: distance from the nearest node of this boundary, length.
     """
 
-    R: float
-    Z: float
+    position: tuple[float, ...]
     layer: str
     boundary: str
     distance: float
 
     def __str__(self) -> str:
         layer = f" in layer {self.layer!r}" if self.layer else ""
+        axes = "(R, Z)" if len(self.position) == 2 else "(x, y, z)"
+        where = f"{axes} = ({', '.join(f'{v:.6g}' for v in self.position)}){layer}"
         if not self.boundary:
-            return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}"
+            return where
         side = f", {self.distance:.3g} from boundary {self.boundary!r}" if self.distance else f", on {self.boundary!r}"
-        return f"(R, Z) = ({self.R:.6g}, {self.Z:.6g}){layer}{side}"
+        return where + side
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
@@ -39,17 +39,17 @@ def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
 
     Args:
         mesh: the mesh.
-        point: reference coordinates, shape (2,), length, equal on all ranks; in three dimensions (x, y).
+        point: reference coordinates, shape (2,), in three dimensions (3,), length, equal on all ranks.
         layer: name of the layer that contains the point, "" if unknown.
     """
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
-        nodes = mesh.nodes_of(name)[:, :2]
+        nodes = mesh.nodes_of(name)
         if len(nodes):
-            gap = float(np.hypot(*(nodes - point).T).min())
+            gap = float(np.linalg.norm(nodes - point, axis=1).min())
             best, size = (name, gap) if gap < best[1] else best, max(size, float(np.abs(nodes).max()))
-    R, Z, distance = (0.0 if abs(v) < 1e-9 * size else float(v) for v in (*point, best[1]))
-    return Place(R, Z, layer, best[0], distance)
+    *position, distance = (0.0 if abs(v) < 1e-9 * size else float(v) for v in (*point, best[1]))
+    return Place(tuple(position), layer, best[0], distance)
 
 
 def shape_quality(corners: np.ndarray) -> np.ndarray:
@@ -60,13 +60,16 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
     It is 1 for an equilateral triangle, 0 for a flat one, and negative for a clockwise one.
 
     Args:
-        corners: corners of the triangles, shape (n, 3, 2), length.
+        corners: corners of the triangles, shape (n, 3, 2), in three dimensions (n, 3, 3), length.
 
     Returns:
-        Shape quality of each triangle, shape (n,).
+        Shape quality of each triangle, shape (n,); positive in three dimensions.
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
-    area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
+    if corners.shape[2] == 3:
+        area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    else:
+        area = ((b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]) / 2
     squares = sum(((p - q) ** 2).sum(1) for p, q in ((a, b), (b, c), (c, a)))
     return 4 * np.sqrt(3) * area / squares
 
@@ -78,7 +81,7 @@ class Triangles:
         mesh: the mesh.
 
     Attributes:
-        corners: corners (R, Z), in three dimensions (x, y), shape (m, 3, 2), length.
+        corners: corners (R, Z), in three dimensions (x, y, z), shape (m, 3, 2 or 3), length.
         layer: names of their layers, shape (m,).
         edge: longest edges, shape (m,), length.
         area: areas, shape (m,), length^2.
@@ -94,9 +97,9 @@ class Triangles:
         for name, tag in mesh.layers.items():
             found = mesh.cells.find(tag)
             names[found[found < n]] = name
-        self.corners = gathered(mesh.comm, cell_node_positions(mesh.domain, owned)[:, :3, :2])
+        self.corners = gathered(mesh.comm, cell_node_positions(mesh.domain, owned)[:, :3])
         self.layer = gathered(mesh.comm, names).astype(str)
-        edges = np.stack([np.hypot(*(self.corners[:, i] - self.corners[:, j]).T)
+        edges = np.stack([np.linalg.norm(self.corners[:, i] - self.corners[:, j], axis=1)
                           for i, j in ((0, 1), (1, 2), (2, 0))], 1)
         self.edge = edges.max(1)
         self.area = np.abs(shape_quality(self.corners)) * (edges**2).sum(1) / (4 * np.sqrt(3))

@@ -165,7 +165,7 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
             total = comm.allreduce(float(np.sum(part**2)), MPI.SUM)
             residual[name] = float(np.sqrt(total)) / scale if np.isfinite(total) else np.inf
     sizes = np.nan_to_num(np.linalg.norm(values[dofs], axis=1), nan=np.inf)
-    mine = (float(sizes.max(initial=-1.0)), points[np.argmax(sizes)].tolist() if len(sizes) else [0.0, 0.0])
+    mine = (float(sizes.max(initial=-1.0)), points[np.argmax(sizes)].tolist() if len(sizes) else [0.0] * points.shape[1])
     point = np.array(max(comm.allgather(mine))[1])
     return residual, place(problem.scene.mesh, point), point
 
@@ -176,9 +176,9 @@ def _deformed_position(problem: Any, state: Any, point: np.ndarray) -> np.ndarra
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
     points = dof_positions(vectors)[: len(dofs)]
     own = dofs[:, 0] < problem.forms.space.dofmap.index_map.size_local
-    away = np.hypot(*(points[own] - point).T)
+    away = np.linalg.norm(points[own] - point, axis=1)
     at = int(np.argmin(away)) if len(away) else 0
-    mine = (np.inf, [0.0, 0.0])
+    mine = (np.inf, [0.0] * len(point))
     if len(away):
         mine = (float(away[at]), (problem.forms.length * state.x[dofs[own][at]]).tolist())
     return point + np.array(min(problem.comm.allgather(mine))[1])

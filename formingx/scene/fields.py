@@ -12,7 +12,7 @@ from ..errors import InputError, finite, values
 from ..io import csv_files
 from ..mesh import Mesh
 from ..mesh.locate import locate
-from ..mesh.nodes import axes
+from ..mesh.nodes import arguments, axes
 from ..ranks import gathered
 from ..values.table import Table
 
@@ -28,12 +28,12 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 
             - A number.
             - A `Table` over R.
-            - A function of arrays (R, Z), shape (n,) each.
+            - A function of arrays (R, Z), shape (n,) each; in three dimensions (x, y) or (x, y, z).
             - The name of a CSV file with columns R, Z, T (points all around the body), or R, T, or Z, T (constant along
               the other coordinate).
             - The result of `fx.heat`, of which the last state counts.
             - A scalar DOLFINx `Function` on a mesh of the body.
-        points: reference positions, shape (n, 2), length.
+        points: reference positions, shape (n, 2 or 3), length.
         mesh: the `Mesh`.
         name: name of the argument, for messages.
 
@@ -57,7 +57,7 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
             name of a CSV file, the result of `fx.heat`, or a DOLFINx `Function`.
         points: reference positions, the same on all ranks, shape (n, 2), length.
         name: name of the argument, for messages.
-        axes: names of the coordinates, "RZ" or "xy".
+        axes: names of the coordinates, "RZ" or "xyz".
     """
     if isinstance(field, type | Mapping | Sequence) and not isinstance(field, str):
         raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}")
@@ -71,7 +71,7 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
     elif hasattr(field, "temperature"):
         return _values(field.temperature(), points, name, axes)
     elif callable(field):
-        return values(name, field, dict(zip(axes, points.T)))
+        return values(name, field, arguments(field, dict(zip(axes, points.T))))
     else:
         found = np.full(len(points), finite(name, field))
     if not np.all(np.isfinite(found)):
@@ -118,15 +118,15 @@ class PointReader:
 def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
     """Return the temperatures at points, shape (n, 2), by linear interpolation in a CSV file, shape (n,).
 
-    The file has the column T and one or both coordinates as columns. `names` is "RZ" or "xy", their names.
+    The file has the column T and one or more coordinates as columns. `names` is "RZ" or "xyz", their names.
     """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
     table = csv_files.read(file)
     axes = [k for k, name in enumerate(names) if name in table.columns]
     if not axes:
-        raise InputError(f"{table.name}: has the columns {', '.join(table.columns)}: must have T, and"
-                         f" {', '.join(names)} or both")
+        raise InputError(f"{table.name}: has the columns {', '.join(table.columns)}: must have T, and one or more of"
+                         f" {', '.join(names)}")
     for name in ("T", *(names[k] for k in axes)):
         if name in table.units and table.units[name] is not None:
             raise InputError(f"{table.name}: column {name!r} is in {table.units[name]!r}: a temperature is read as it"
@@ -161,7 +161,7 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
 
 
 def _check_inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) -> None:
-    """Raise an InputError unless the mask `inside` is True for all points; `name` is the file, `axes` "RZ" or "xy"."""
+    """Raise an InputError unless the mask `inside` is True for all points; `name` is the file, `axes` "RZ" or "xyz"."""
     if not np.all(inside):
         raise InputError(f"{name}: point {_first_false(points, inside, axes)} of the body lies outside the points of"
                          f" the file")
@@ -173,7 +173,6 @@ def _first_false(points: np.ndarray, mask: np.ndarray, axes: str) -> str:
     Args:
         points: points, shape (n, 2), length.
         mask: mask of the points, shape (n,).
-        axes: names of the coordinates, "RZ" or "xy".
+        axes: names of the coordinates, "RZ" or "xyz".
     """
-    first, second = points[np.argmin(mask)]
-    return f"({', '.join(axes)}) = ({first:.6g}, {second:.6g})"
+    return f"({', '.join(axes)}) = ({', '.join(f'{v:.6g}' for v in points[np.argmin(mask)])})"

@@ -9,7 +9,7 @@ import numpy as np
 from .. import _compat
 from ..materials.constants import Sample
 from ..mesh.mesh import Mesh
-from ..mesh.nodes import COORDINATES, cell_node_positions, own_cells
+from ..mesh.nodes import cell_node_positions, own_cells
 from .temperature import GivenTemperature
 
 
@@ -23,7 +23,7 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | 
         temperature: temperature of the scene, or None.
 
     Returns:
-        Reference positions of q points in each of m cells, shape (m q, 2), length. Local numbers of the cells, shape
+        Reference positions of q points in each of m cells, shape (m q, 2 or 3), length. Local numbers of the cells, shape
         (m,), positions in the reference cell, shape (q, 2), and temperatures, shape (m q,) or None.
     """
     domain = mesh.domain
@@ -32,6 +32,6 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | 
     places: Any = basix.make_quadrature(basix.CellType.triangle, degree)[0]
     geometry = basix.ufl.element("Lagrange", "triangle", _compat.coordinate_map(domain).degree)
     shapes: Any = geometry.tabulate(0, places)
-    nodes = cell_node_positions(domain, cells)[..., :COORDINATES]
+    nodes = cell_node_positions(domain, cells)
     T = None if temperature is None else temperature.in_cells(cells, places).ravel()
     return Sample(np.einsum("qk,nkd->nqd", shapes[0], nodes).reshape(-1, nodes.shape[-1]), cells, places, domain, T)

@@ -21,9 +21,11 @@ def summary(scene: Any) -> dict[str, str]:
         {name of the part, such as "load 1": its description}.
     """
     mesh, extent = scene.mesh, scene.extent
-    kind, axes = ("six-node ", "(R, Z)") if scene.kinematics.components == 2 else ("", "(x, y)")
-    lines = {"mesh": f"{mesh.domain.topology.index_map(2).size_global} {kind}triangles, {extent[0]:.6g} by"
-                     f" {extent[1]:.6g} {axes}; layers: {', '.join(mesh.layers)}"
+    kind, axes = ("six-node ", "(R, Z)") if scene.kinematics.components == 2 else ("", "(x, y, z)")
+    if len(extent) == 3 and extent[2] <= 1e-9 * max(extent):
+        extent, axes = extent[:2], "(x, y)"
+    lines = {"mesh": f"{mesh.domain.topology.index_map(2).size_global} {kind}triangles,"
+                     f" {' by '.join(f'{v:.6g}' for v in extent)} {axes}; layers: {', '.join(mesh.layers)}"
                      f"; boundaries: {', '.join(mesh.boundaries)}"}
     for name, material in scene.materials.items():
         lines[f"material of {name}"] = _material(material, _temperatures(scene))

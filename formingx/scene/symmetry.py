@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..mesh.nodes import COORDINATES, SAME_PLACE, span
+from ..mesh.nodes import SAME_PLACE, span
 from ..physics.supports import Symmetry
 
 _PARTS = {1: "half", 2: "quarter", 3: "eighth"}
@@ -16,7 +16,7 @@ class MirrorPlane(NamedTuple):
     """Plane across which the part continues as the mirror image of the body.
 
     Attributes:
-        axis: index of the coordinate that is constant in the plane, 0 or 1.
+        axis: index of the coordinate that is constant in the plane.
         position: value of that coordinate, length.
         above: True if the body lies on the side of larger values of this coordinate.
         boundary: name of the boundary of the body that lies in the plane.
@@ -151,7 +151,7 @@ def mirror_planes(scene: Any) -> MirrorPlanes:
             continue
         (constraint,) = kinematics.in_axes(support, support.constraints())
         axis = constraint.component
-        if kinematics.axisymmetric and axis == 0 or axis >= COORDINATES:      # a flat sheet lies in z = 0
+        if kinematics.axisymmetric and axis == 0:
             continue
         low, high = body[:, axis]
         positions = mesh.nodes_of(support.on)[:, axis]

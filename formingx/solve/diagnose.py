@@ -304,7 +304,7 @@ def _element_findings(run: FailedRun) -> Iterator[Finding]:
     small = J is not None and _LIMITS.min_volume_ratio > J
     if J is not None and (small or facts["shape"] < _LIMITS.min_quality_ratio and (inverted or infinite)):
         now = f"J = {J:.3g}" if small else f"its shape quality is {facts['shape']:.2g} times that at rest"
-        R, Z = facts["at_J"].R, facts["at_J"].Z
+        R, Z = facts["at_J"].position
         yield Finding("serious", "element",
                       f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
                       + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""),

@@ -18,7 +18,7 @@ from ...mesh import text as grid
 from ...results import files
 from ...results.show import plots
 
-_COORDINATES_OF = {2: ("R", "Z"), 3: ("X", "Y")}
+_COORDINATES_OF = {2: ("R", "Z"), 3: ("X", "Y", "Z")}
 """{number of displacement components: columns of the reference coordinates}; a sheet in three dimensions is flat."""
 
 
@@ -62,7 +62,7 @@ class NodalComparison:
         k = int(np.argmax(self.difference))
         position, ours, theirs = (", ".join(f"{v:.{digits}g}" for v in row[k]) for row, digits in (
             (self.points, 6), (self.ours, 8), (self.theirs, 8)))
-        size, reference = self.largest or 1.0, ", ".join(_COORDINATES_OF[self.ours.shape[1]])
+        size, reference = self.largest or 1.0, ", ".join(_COORDINATES_OF[self.ours.shape[1]][:self.points.shape[1]])
         return (f"{len(self.nodes)} nodes; our largest displacement is {self.largest:.6g}\n"
                 f"largest difference {self.maximum:.5g} ({percent(self.maximum / size)}), at node {self.nodes[k]},"
                 f" ({reference}) = ({position}): ours ({ours}), theirs ({theirs})\n"
@@ -109,8 +109,9 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
     'node,R,Z,u_r,u_z'
     """
     mesh_grid = meshes.to_grid(path.problem.scene.mesh) if mesh is None else grid.read(mesh)
-    u = _displacements(path, state, mesh_grid.points)
-    rows = [[int(n), *X, *v] for n, X, v in zip(mesh_grid.numbers, mesh_grid.points.tolist(), u.tolist())]
+    points = mesh_grid.points[:, :len(_coordinates(path))]
+    u = _displacements(path, state, points)
+    rows = [[int(n), *X, *v] for n, X, v in zip(mesh_grid.numbers, points.tolist(), u.tolist())]
     files.write_rows(file, ["node", *_columns(path)], rows, path.problem.comm)
 
 
@@ -124,7 +125,8 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
     Args:
         path: the computed `Path`.
         theirs: a CSV file or {column: values} with the displacements u_r, u_z, and the reference positions R, Z or,
-            with `mesh`, the numbers node. For a sheet in three dimensions u_x, u_y, u_z and X, Y.
+            with `mesh`, the numbers node. In three dimensions u_x, u_y, u_z and X, Y, and Z unless
+            the sheet is flat.
         state: a state of the path; default the last. To compare at a pressure: `path.state_at(formingx.pressure(...))`.
         mesh: a text mesh file (`formingx.mesh.Grid`) with the reference positions of the numbered nodes, in our unit.
         columns: {our name: their name} for columns with other names.
@@ -158,7 +160,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
             raise InputError(f"{table.name}: column {names.get('node', 'node')!r}: node numbers must be whole numbers")
         return numbers.astype(int)
     if mesh is None:
-        points = np.column_stack([column(name) for name in _columns(path)[:2]])
+        points = np.column_stack([column(name) for name in _coordinates(path)])
         numbered = names.get("node", "node") in table.columns
         nodes = node_numbers() if numbered else np.arange(1, len(points) + 1)
     else:
@@ -170,7 +172,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
                 raise InputError(f"{table.name}: node {node} is not in the mesh file {os.fspath(mesh)!r}")
         points = mesh_grid.points[[rows[int(n)] for n in nodes]]
     ours = _displacements(path, state, points)
-    return NodalComparison(nodes, points, ours, np.column_stack([column(c) for c in _columns(path)[2:]]),
+    return NodalComparison(nodes, points, ours, np.column_stack([column(c) for c in _columns(path)[len(_coordinates(path)):]]),
                            float(np.linalg.norm(ours, axis=1).max()))
 
 
@@ -179,8 +181,14 @@ def _columns(path: Any) -> list[str]:
 
     path: the `Path` of the run.
     """
-    axes = path.problem.scene.kinematics.axes
-    return [*_COORDINATES_OF[len(axes)], *(f"u_{axis}" for axis in axes)]
+    return [*_coordinates(path), *(f"u_{axis}" for axis in path.problem.scene.kinematics.axes)]
+
+
+def _coordinates(path: Any) -> tuple[str, ...]:
+    """Return the names of columns with reference positions: R, Z; X, Y of a flat sheet, X, Y, Z of another surface."""
+    scene = path.problem.scene
+    names = _COORDINATES_OF[scene.kinematics.components]
+    return names[:2] if len(names) == 3 and scene.mesh.flat else names
 
 
 def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:

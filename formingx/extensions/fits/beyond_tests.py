@@ -13,7 +13,6 @@ from ... import _compat
 from ...checks.expected_stretch import expected_stretches
 from ...findings import Finding, register
 from ...forms.transfer import isochoric_gradients
-from ...mesh.nodes import COORDINATES
 from ...mesh.triangles import place
 from ...ranks import gathered
 from ...values.tolerances import NOTICEABLE
@@ -71,7 +70,7 @@ def strains_beyond_tests(path: Any) -> Iterator[Finding]:
         furthest = int(np.argmax(np.where(outside, tested.distance(strains), 0.0)))
         largest, middle = strains[furthest]
         point = points[furthest]
-        where = place(scene.mesh, point) if scene.kinematics.components == COORDINATES else tuple(point)
+        where = place(scene.mesh, point)
         undetermined = f"; they leave {', '.join(tested.undetermined)} open" if tested.undetermined else ""
         yield Finding("warning", f"materials[{terms.names[0]!r}]",
                       f"{100 * share:.3g} % of it is deformed as in none of its tests, furthest at {where}, where it is"

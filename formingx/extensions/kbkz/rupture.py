@@ -7,7 +7,6 @@ import numpy as np
 
 from ...checks.expected_stretch import expected_stretches
 from ...findings import Finding, register
-from ...mesh.nodes import COORDINATES
 from ...mesh.triangles import place
 from .past_states import PastStates
 
@@ -52,7 +51,7 @@ def thins(failure: Any) -> Iterator[Finding]:
             limit = past.material.base.rupture_stretch("equibiaxial")
             smallest, point = past.smallest_stretch()
             if (stretch := smallest**-0.5) > max(limit, drawn[0] if drawn else 0.0):
-                drawn = stretch, limit, place(problem.scene.mesh, point[:COORDINATES])
+                drawn = stretch, limit, place(problem.scene.mesh, point)
     if drawn is not None:
         stretch, limit, where = drawn
         yield Finding("serious", "rupture",

@@ -3,12 +3,16 @@
 from typing import Any
 
 from ...contact.tooling import register_tools, tool_of
+from ...mesh.files import SurfaceReader, surface_readers
 from ...physics.kinematics import ThreeD
 from . import scene_checks
 from .reader import SheetReader
+from .curved import revolved as revolved_surface
+from .curved import stl_grid, surface, tube
 from .sheet import circle, rectangle, sheet
 from .solid_tool import SolidTool, Swept, box, extruded, revolved
 from .surface import Surface
+from .surface_mesh import of_plain
 from .triangulated import solid
 from .union import Union, union
 
@@ -34,6 +38,7 @@ def _tool(shape: dict[str, Any]) -> SolidTool:
     return found.moved(*shape.get("shift", (0.0, 0.0, 0.0)))
 
 
+surface_readers.append(SurfaceReader(stl_grid, of_plain))
 ThreeD.formulation = Surface
 ThreeD.reader = SheetReader
 ThreeD.scene_checks = scene_checks

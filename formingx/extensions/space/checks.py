@@ -58,7 +58,7 @@ def coarse_triangles(body: Any) -> Iterator[Finding]:
                    for c in scene.kinematics.in_axes(support, support.constraints()))]
     if not held:
         return
-    reach = float(nearest(np.vstack(held), scene.mesh.nodes_of("bottom"))[0].max())
+    reach = float(nearest(np.vstack(held), scene.mesh.whole()[0])[0].max())
     longest = float(body.edge.max())
     if 2 * longest > reach:
         yield Finding("warning", "mesh", f"edges of triangles are up to {body.format(longest, 'travel', 3)} long, and"

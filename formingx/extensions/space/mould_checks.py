@@ -54,7 +54,7 @@ def narrow_sheets(body: Any) -> Iterator[Finding]:
         A finding for each such mould.
     """
     scene = body.scene
-    for contact in moulds(scene) if scene.kinematics.components == 3 else ():
+    for contact in moulds(scene) if scene.kinematics.components == 3 and scene.mesh.flat else ():
         tool = contact.tool
         if not tool.sized:
             continue
@@ -93,7 +93,7 @@ def narrow_moulds(body: Any) -> Iterator[Finding]:
             continue
         mouths = [_distances_at_mouth(c.tool, points[~met], ahead) for c in contacts if c.tool.sized]
         distance = np.min([nearest(np.vstack([points[met], *held]), points[~met])[0], *mouths], axis=0)
-        layers = [(material, float(np.mean(scene.thickness[name](*points[:, :2].T))))
+        layers = [(material, float(np.mean(scene.thickness[name](*points.T))))
                   for name, material in scene.materials.items()]
         peak = first_peak(FreeInflation(layers, float(distance.max())).disc) if distance.any() else None
         excessive = [entry for entry in pressures if peak is not None and abs(entry.value) > peak.pressure]
@@ -107,8 +107,9 @@ def narrow_moulds(body: Any) -> Iterator[Finding]:
 
 
 def _fixed(scene: Any) -> list[Contact]:
-    """Return the contacts of a sheet in three dimensions with fixed tools of finite size."""
-    return [c for c in scene.contacts if scene.kinematics.components == 3 and c.direction is None and c.tool.sized]
+    """Return the contacts of a flat sheet in three dimensions with fixed tools of finite size."""
+    return [c for c in scene.contacts if scene.kinematics.components == 3 and scene.mesh.flat and c.direction is None
+            and c.tool.sized]
 
 
 def _whole_extent(scene: Any) -> np.ndarray:
@@ -127,7 +128,7 @@ def _widths(tool: Any) -> np.ndarray:
 
 def _nodes_and_direction(scene: Any, contact: Contact) -> tuple[np.ndarray, float]:
     """Return the nodes of the sheet, shape (n, 3), length, and the z of the unit normal out of a contact's face."""
-    return np.unique(scene.mesh.nodes_of(contact.on), axis=0), 1.0 if contact.on == "top" else -1.0
+    return np.unique(scene.mesh.nodes_of(contact.on), axis=0), scene.mesh.faces[contact.on]
 
 
 def _distances_at_mouth(tool: Any, points: np.ndarray, ahead: float) -> np.ndarray:

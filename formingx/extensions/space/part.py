@@ -8,7 +8,6 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, finite, positive
-from ...mesh.nodes import COORDINATES
 from ...results.files.column_table import ColumnTable
 from ...results.numbers import PartNumbers
 from ...scene.symmetry import MirrorPlanes
@@ -28,7 +27,7 @@ class SheetPart(PartNumbers):
         mean_wall: mean wall thickness, volume over area, length.
         min_wall: minimum wall thickness, length.
         min_wall_at: deformed position (x, y, z) of the minimum wall, length.
-        min_wall_reference: position (X, Y) of the minimum wall on the flat sheet, length.
+        min_wall_reference: reference position of the minimum wall, (X, Y) on a flat sheet, else (X, Y, Z), length.
         uniformity: minimum over mean wall thickness.
         variation: standard deviation of the wall thickness over the surface, over its mean.
         weight: weight in grams if a density in g/cm3 was given; else None.
@@ -59,7 +58,8 @@ class SheetPart(PartNumbers):
         """Rows of a table of the formed part, (label, value with its unit), both as text."""
         deformed, reference = (", ".join(f"{v:.4g}" for v in position) for position in (
             self.min_wall_at, self.min_wall_reference))
-        return self._rows(f"(x, y, z) = ({deformed}), from (X, Y) = ({reference})", []) + (
+        axes = "(X, Y)" if len(self.min_wall_reference) == 2 else "(X, Y, Z)"
+        return self._rows(f"(x, y, z) = ({deformed}), from {axes} = ({reference})", []) + (
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 
 
@@ -99,7 +99,7 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
     weight = None if density is None else units.mass(images * volume, positive("part: density", density))
     return SheetPart(images * volume, images * float(area.sum()), float(area.sum() / rest.sum()), mean,
                      float(wall.wall[k]), tuple(wall.middle[k].tolist()),
-                     tuple(wall.reference_points[wall.triangles[k], :COORDINATES].mean(0).tolist()),
+                     tuple(wall.reference_points[wall.triangles[k], :2 if wall.flat else 3].mean(0).tolist()),
                      float(wall.wall[k] / mean),
                      float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
                      weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()),

@@ -1,5 +1,7 @@
 """Checks of a scene in three dimensions. Combinations that no test has verified are refused."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping
 from functools import partial
 from typing import Any
@@ -7,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, call_on_all_ranks, check_name, finite, positive, values
-from ...mesh.nodes import SAME_PLACE
+from ...mesh.nodes import SAME_PLACE, arguments
 from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode, Symmetry
 from ...ranks import gathered
-from .sheet import Sheet
+from .surface_mesh import SurfaceMesh
 
 _EXTENT_RATIO = 9.0
 """Ratio of the largest extents of tool and sheet, either way, from which their units of length probably differ.
@@ -25,21 +27,22 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
 
     Args:
         scene: the `Scene`.
-        given: the argument `thickness` of the scene: a length, a function of arrays (x, y) that returns lengths, or
-            {layer: length or function}.
+        given: the argument `thickness` of the scene: a length, a function of arrays (x, y) or (x, y, z) that returns
+            lengths, or {layer: length or function}.
 
     Returns:
-        {layer: function of arrays (x, y)}, positive at all nodes.
+        {layer: function of arrays (x, y, z)}, positive at all nodes.
 
     Raises:
-        InputError: the mesh is no `Sheet`, a layer has no thickness, or a thickness is not positive.
+        InputError: the mesh is no `SurfaceMesh`, a layer has no thickness, or a thickness is not positive.
     """
     mesh = scene.mesh
-    if not isinstance(mesh, Sheet):
-        raise InputError("Scene: mesh: a mesh in three dimensions must come from fx.mesh.sheet")
+    if not isinstance(mesh, SurfaceMesh):
+        raise InputError("Scene: mesh: a mesh in three dimensions must come from fx.mesh.sheet, tube, revolved, surface or"
+                         " read")
     if given is None:
-        raise InputError("Scene: a sheet in three dimensions needs a thickness=...: a length, a function of (x, y), or"
-                         " {layer: ...}")
+        raise InputError("Scene: a sheet in three dimensions needs a thickness=...: a length, a function of (x, y) or"
+                         " (x, y, z), or {layer: ...}")
     each = given if isinstance(given, Mapping) else dict.fromkeys(mesh.layers, given)
     for name in each:
         check_name("Scene: thickness: layer", name, mesh.layers)
@@ -53,36 +56,47 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
     found: dict[str, Callable] = {}
     for name, h in each.items():
         if callable(h):
-            found[name] = h
-            call_on_all_ranks(mesh.comm, [partial(_check, name, h, X)])
+            found[name] = h if isinstance(h, _OfPosition) else _OfPosition(h)
+            call_on_all_ranks(mesh.comm, [partial(_check, name, found[name], X)])
         else:
             found[name] = _Constant(positive(f"Scene: thickness of {name!r}", h))
     return found
 
 
 class _Constant:
-    """Constant thickness as a function of arrays (x, y)."""
+    """Constant thickness as a function of arrays (x, y, z)."""
 
     def __init__(self, value: float):
         self.value = value
 
-    def __call__(self, x: Any, y: Any) -> Any:
+    def __call__(self, x: Any, y: Any, z: Any = 0.0) -> Any:
         return self.value + 0 * x
 
 
-def _check(name: str, function: Callable, X: np.ndarray) -> None:
+class _OfPosition:
+    """Thickness as a function of arrays (x, y, z), made from a user's function of (x, y) or (x, y, z)."""
+
+    def __init__(self, function: Callable):
+        self.function = function
+
+    def __call__(self, x: Any, y: Any, z: Any = 0.0) -> Any:
+        return self.function(*arguments(self.function, {"x": x, "y": y, "z": z}).values())
+
+
+def _check(name: str, function: _OfPosition, X: np.ndarray) -> None:
     """Raise an InputError unless the thickness of a layer is positive at all nodes.
 
     Args:
         name: name of the layer.
-        function: thickness as a function of arrays (x, y).
+        function: thickness of the layer.
         X: reference positions of the nodes, shape (n, 3), length.
     """
-    found = values(f"Scene: thickness of {name!r}", function, {"x": X[:, 0], "y": X[:, 1]})
+    places = arguments(function.function, dict(zip("xyz", X.T)))
+    found = values(f"Scene: thickness of {name!r}", function.function, places)
     if len(found) and found.min() <= 0:
         k = int(np.argmin(found))
-        raise InputError(f"Scene: thickness of {name!r} = {found[k]:.6g} at ({X[k, 0]:.6g}, {X[k, 1]:.6g}): must be"
-                         f" greater than 0")
+        at = ", ".join(f"{x[k]:.6g}" for x in places.values())
+        raise InputError(f"Scene: thickness of {name!r} = {found[k]:.6g} at ({at}): must be greater than 0")
 
 
 def refuse(scene: Any, heat: Any) -> None:
@@ -106,9 +120,9 @@ def refuse(scene: Any, heat: Any) -> None:
         if isinstance(load, CentrifugalLoad):
             raise InputError(f"Scene: {load!r}: it spins about the axis of an axisymmetric body, which a sheet in"
                              " three dimensions has not")
-        if isinstance(load, Pressure) and load.on not in ("bottom", "top"):
-            raise InputError(f"Scene: {load!r}: a sheet in three dimensions takes a pressure on its 'bottom' or its"
-                             " 'top'")
+        if isinstance(load, Pressure) and load.on not in scene.mesh.faces:
+            raise InputError(f"Scene: {load!r}: a surface in three dimensions takes a pressure on its"
+                             f" {' or its '.join(map(repr, scene.mesh.faces))}")
     for support in scene.supports:
         if isinstance(support, PinnedNode):
             raise InputError(f"Scene: {support!r}: a sheet in three dimensions is supported at its boundaries, not at"
@@ -125,7 +139,8 @@ def _check_plane(scene: Any, support: Symmetry) -> None:
     if flat[constraint.component]:
         return
     axis, along = "xyz"[constraint.component], nodes[:, constraint.component]
-    fitting = [f"Symmetry({support.on!r}, {name!r})" for name, constant in zip("xy", flat) if constant]
+    fitting = [f"Symmetry({support.on!r}, {name!r})" for name, constant in zip("xy" if scene.mesh.flat else "xyz", flat)
+               if constant]
     raise InputError(f"Scene: {support!r}: its plane of symmetry is normal to {axis}, but along the edge"
                      f" {support.on!r} {axis} goes from {along.min():.6g} to {along.max():.6g}: must be"
                      f" {fitting[0] if fitting else 'a straight edge along x or y; another edge can be Clamped'}")
@@ -143,8 +158,9 @@ def check_contact(scene: Any, contact: Any) -> None:
             or a sheet that starts inside the tool.
     """
     mesh, tool = scene.mesh, contact.tool
-    if contact.on not in ("bottom", "top"):
-        raise InputError(f"{contact!r}: a sheet in three dimensions touches with its 'bottom' or its 'top'")
+    if contact.on not in mesh.faces:
+        raise InputError(f"{contact!r}: a surface in three dimensions touches with its"
+                         f" {' or its '.join(map(repr, mesh.faces))}")
     if contact.friction_by_temperature:
         raise InputError(f"{contact!r}: in three dimensions friction does not depend on the temperature yet: must be"
                          f" 'stick', 'none' or one coefficient")

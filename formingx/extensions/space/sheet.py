@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any, NamedTuple
 
@@ -15,44 +14,10 @@ from ...errors import InputError, as_list, check_name, check_type, non_negative,
 from ...mesh import with_gmsh
 from ...mesh.check import crossing_point
 from ...mesh.divisions import MAX_RECTANGLES
-from ...mesh.grid import Grid, counter_clockwise, to_mesh
-from ...mesh.mesh import Mesh
+from ...mesh.grid import Grid, counter_clockwise
+from .surface_mesh import SurfaceMesh, surface_mesh
 
 _PARTS = ("whole", "half", "quarter")
-
-
-@dataclass(frozen=True)
-class Sheet(Mesh):
-    """Mesh of a sheet in three dimensions: triangles in the plane z = 0 in the reference configuration.
-
-    Each layer covers the whole sheet. Besides the boundaries of its outline a sheet has the faces "bottom" and "top"
-    (towards +z). A membrane has one surface only, so the face on which a pressure acts determines the direction of the
-    pressure. The boundary "bottom" and the boundary "top" of the mesh each contain all edges of the triangles.
-
-    Attributes:
-        of_size: function that meshes the same sheet again; its argument is the edge length of the triangles, a number
-            or a function of (x, y).
-    """
-
-    of_size: Callable[[Any], Sheet] | None = None
-
-    def __str__(self) -> str:
-        x, n = self.domain.geometry.x, self.domain.topology.index_map(2).size_global
-        span = ", ".join(f"{a} from {x[:, k].min():.6g} to {x[:, k].max():.6g}" for k, a in enumerate("xy"))
-        return "\n".join([f"{n} triangles" + f", {span}" * (self.comm.size == 1),
-                          f"layers: {', '.join(self.layers)}", f"boundaries: {', '.join(self.boundaries)}"])
-
-    def facets_of(self, boundary: str) -> np.ndarray:
-        """Return the local numbers of the edges on a boundary, shape (k,); all edges for the faces "bottom" and "top".
-
-        Args:
-            boundary: name of the boundary.
-        """
-        if boundary in ("bottom", "top"):
-            edges = self.domain.topology
-            edges.create_entities(1)
-            return np.arange(edges.index_map(1).size_local + edges.index_map(1).num_ghosts, dtype=np.int32)
-        return super().facets_of(boundary)
 
 
 class Edge(NamedTuple):
@@ -145,7 +110,7 @@ def circle(radius: float, *, part: str = "whole") -> list[Edge]:
 
 
 def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, names: Sequence[str] | None = None,
-          layers: Sequence[str] = ("sheet",), reflected: Sequence[str] = (), comm: MPI.Comm = MPI.COMM_WORLD) -> Sheet:
+          layers: Sequence[str] = ("sheet",), reflected: Sequence[str] = (), comm: MPI.Comm = MPI.COMM_WORLD) -> SurfaceMesh:
     """Mesh a flat sheet in the plane z = 0 with triangles within an outline, by gmsh.
 
     Args:
@@ -199,12 +164,8 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
         raise InputError(f"sheet: size = {size!r}: would make more than {2 * MAX_RECTANGLES} triangles of the sheet,"
                          f" whose area is {areas.sum():.4g}")
     words = as_list("sheet: layers", layers, "names")
-    if not words or len(set(words)) < len(words):
-        raise InputError(f"sheet: layers = {layers!r}: must be at least one name, and each another")
-    plain = to_mesh(lambda: reduce(_reflected, lines, _grid(edges, edge_length)), comm, "sheet")
-    return Sheet(**{**vars(plain), "layers": dict.fromkeys(words, 1),
-                    "boundaries": plain.boundaries | {"bottom": (), "top": ()},
-                    "of_size": lambda size: sheet(edges, size, layers=words, reflected=lines, comm=comm)})
+    return surface_mesh(lambda: reduce(_reflected, lines, _grid(edges, edge_length)), comm, "sheet", ("bottom", "top"),
+                        words, of_size=lambda size: sheet(edges, size, layers=words, reflected=lines, comm=comm))
 
 
 def _chords(edges: list[Edge]) -> np.ndarray:
@@ -338,7 +299,7 @@ def _grid(edges: list[Edge], size: _Size) -> Grid:
                 np.concatenate(rows).astype(np.int64)].reshape(-1, 2)
         if not len(cells):
             raise InputError("sheet: the outline holds no triangle: must be closed, and not cross itself")
-        return Grid(X, np.arange(1, len(X) + 1), {"sheet": counter_clockwise(X, cells)}, boundaries)
+        return Grid(X, np.arange(1, len(X) + 1), {"sheet": counter_clockwise(X[:, :2], cells)}, boundaries)
 
 
 def _reflected(grid: Grid, name: str) -> Grid:
@@ -366,6 +327,6 @@ def _reflected(grid: Grid, name: str) -> Grid:
     image = np.arange(len(X))
     image[outside] = len(X) + np.arange(len(outside))
     points = np.vstack([X, X[outside] - 2 * d[outside, None] * normal])
-    cells = counter_clockwise(points, np.vstack([sheet, image[sheet]]))
+    cells = counter_clockwise(points[:, :2], np.vstack([sheet, image[sheet]]))
     boundaries = {other: np.vstack([ends, image[ends]]) for other, ends in grid.boundaries.items() if other != name}
     return Grid(points, np.arange(1, len(points) + 1), {"sheet": cells}, boundaries)

@@ -12,7 +12,6 @@ import numpy as np
 from ... import figures
 from ...errors import InputError
 from ...mesh.edges import edges_of
-from ...mesh.nodes import COORDINATES
 from ...results import files
 from ...results.show import interactive, page
 from ...results.show.interactive import rounded
@@ -160,11 +159,11 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     found = part(wall, density, trim, (), units, planes)
     record.drawn = int(np.clip(_DRAWN // len(wall.reference_points), *_FRAMES))
     drawn = interactive.data([record], [title or "run"], units, {"mesh": _mesh(path, record, units)})
-    size = np.ptp(wall.reference_points[:, :COORDINATES], axis=0).max() / 12
+    size = np.ptp(wall.reference_points, axis=0).max() / 12
     pictures: list[str] = []
     with TemporaryDirectory() as folder:
         for caption, grid in (("The wall over the original thickness.", None),
-                              ("Squares that were printed on the flat sheet.", size)):
+                              ("Squares that were printed on the body.", size)):
             target = FilePath(folder) / "picture.png"
             try:
                 view(path, last, target, grid)

@@ -13,20 +13,21 @@ from ...mesh.edges import edges_of
 from .bodies import merged
 
 
-def read_stl(name: str) -> tuple[np.ndarray, np.ndarray]:
+def read_stl(name: str, caller: str = "solid") -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices, shape (n, 3), and triangles, shape (m, 3), of an STL file, binary or text.
 
     Args:
         name: path of the file.
+        caller: name of the calling function, for messages.
 
     Raises:
-        InputError: the file cannot be read, or is no STL file of a solid.
+        InputError: the file cannot be read, or is no STL file of a surface.
     """
     try:
         with open(name, "rb") as stream:
             data = stream.read()
     except OSError as error:
-        raise InputError(f"solid: {name!r} cannot be read: {error}") from None
+        raise InputError(f"{caller}: {name!r} cannot be read: {error}") from None
     n = int(np.frombuffer(data[80:84], "<u4")[0]) if len(data) >= 84 else -1
     if len(data) == 84 + 50 * n:
         rows = np.frombuffer(data[84:], dtype=[("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("more", "<u2")])
@@ -37,9 +38,9 @@ def read_stl(name: str) -> tuple[np.ndarray, np.ndarray]:
         try:
             points = np.array([[float(w) for w in words[k + 1:k + 4]] for k in at]).reshape(-1, 3)
         except ValueError:
-            raise InputError(f"solid: {name!r} is no STL file: a vertex is not three numbers") from None
+            raise InputError(f"{caller}: {name!r} is no STL file: a vertex is not three numbers") from None
     if len(points) < 12 or len(points) % 3 or not np.isfinite(points).all():
-        raise InputError(f"solid: {name!r} is no STL file of a solid: it has {len(points)} corners of triangles, which"
+        raise InputError(f"{caller}: {name!r} is no STL file of a surface: it has {len(points)} corners of triangles, which"
                          f" must be finite and at least 12")
     return merged(points, np.arange(len(points)).reshape(-1, 3))
 

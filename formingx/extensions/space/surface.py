@@ -1,7 +1,8 @@
-r"""Forms of a membrane in three dimensions: a flat sheet of triangles that deforms, with its thickness as data.
+r"""Forms of a membrane in three dimensions: a surface of triangles that deforms, with its thickness as data.
 
-With the columns f1 and f2 of the deformation gradient of the mid-surface, shape (3, 2), the deformation gradient of the
-incompressible material is, up to a rotation,
+The surface may be flat or curved in the reference configuration. Each triangle has its own orthonormal vectors t_1 and
+t_2 in its plane. With the columns f_k = F t_k of the deformation gradient of the mid-surface, shape (3, 2), the
+deformation gradient of the incompressible material is, up to a rotation,
 
 .. math::
     F = \begin{pmatrix} |f_1| & f_1 \cdot f_2 / |f_1| & 0 \\ 0 & J / |f_1| & 0 \\ 0 & 0 & 1 / J \end{pmatrix},
@@ -23,6 +24,7 @@ tension, W_r is the energy at that stretch; where l1 < 1 it is 0.
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import basix.ufl
@@ -52,16 +54,16 @@ class Surface(Formulation):
     _on_tools: PressureOnTools | None = None
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """Return the reference normal of a face of the sheet, and the UFL measure of integrals over the sheet.
+        """Return the reference normal of a face of the surface, and the UFL measure of integrals over the surface.
 
         Args:
-            name: "top", towards +z, or "bottom", towards -z.
+            name: name of the face (`SurfaceMesh.faces`).
             quadrature_degree: not used; the degree is 1.
 
         Returns:
             Normal (UFL, shape (3,)), and the measure over the reference area.
         """
-        return ufl.as_vector([0, 0, 1.0 if name == "top" else -1.0]), self.dx(metadata={"quadrature_degree": 1})
+        return self.mesh.faces[name] * self._axes[2], self.dx(metadata={"quadrature_degree": 1})
 
     def refresh(self) -> None:
         super().refresh()
@@ -135,20 +137,29 @@ class Surface(Formulation):
         space, self.thicknesses = fem.functionspace(self.domain, ("Lagrange", 1)), {}
         for name, given in self.scene.thickness.items():
             h = self.thicknesses[name] = fem.Function(space, name=f"thickness of {name}")
-            h.interpolate(lambda X, given=given: given(X[0], X[1]))
+            h.interpolate(lambda X, given=given: given(*X))
         return sum(self.thicknesses.values())
 
     def _deformation_gradient(self) -> Any:
         """Return the deformation gradient of the incompressible membrane, rotated to upper triangular form.
 
-        Its rows belong to axes along the deformed x direction, across it in the surface, and along the normal (UFL,
-        shape (3, 3)).
+        Its rows belong to axes along the deformed first edge of each triangle, across it in the surface, and along the
+        normal (UFL, shape (3, 3)).
         """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
-        f1, f2 = (ufl.as_vector([F[i, k] for i in range(3)]) for k in (0, 1))
+        f1, f2 = (F * t for t in self._axes[:2])
         n = ufl.cross(f1, f2)
         l1, J = ufl.sqrt(ufl.inner(f1, f1)), ufl.sqrt(ufl.inner(n, n))
         return ufl.as_tensor([[l1, ufl.inner(f1, f2) / l1, 0], [0, J / l1, 0], [0, 0, 1 / J]])
+
+    @cached_property
+    def _axes(self) -> tuple[Any, Any, Any]:
+        """Reference unit vectors of each triangle: along its first edge, across it, along the normal (UFL, (3,))."""
+        J = ufl.Jacobian(self.domain)
+        edge, other = (ufl.as_vector([J[i, k] for i in range(3)]) for k in (0, 1))
+        first, normal = edge / ufl.sqrt(ufl.inner(edge, edge)), ufl.cross(edge, other)
+        normal = normal / ufl.sqrt(ufl.inner(normal, normal))
+        return first, ufl.cross(normal, first), normal
 
     def _groups(self) -> list[tuple[Any, list[str]]]:
         return [(material, [name]) for name, material in self.scene.materials.items()]

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import InputError, direction, pair, positive, triple
 from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.edges import edges_of
-from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells, without_round_off
+from ...mesh.nodes import cell_node_positions, own_cells, without_round_off
 from ...ranks import gathered
 from ...results.files.column_table import ColumnTable
 from .surface import wrinkled
@@ -25,7 +25,7 @@ class SheetWall(ColumnTable):
     Attributes:
         reference_points: reference positions of the n nodes, shape (n, 3), length.
         deformed_points: deformed positions of the nodes, shape (n, 3), length.
-        triangles: nodes of each triangle, shape (m, 3), counter-clockwise seen from +z in the reference configuration.
+        triangles: nodes of each triangle, shape (m, 3), counter-clockwise seen from the face "top" or "outer".
         layers: {layer: reference thickness at the centroid of each triangle, shape (m,), length}.
         comm: MPI communicator of the run.
     """
@@ -74,9 +74,18 @@ class SheetWall(ColumnTable):
         """Principal stretches of each triangle in the surface, the larger first, shape (m, 2)."""
         a, b = (x[self.triangles[:, 1:]] - x[self.triangles[:, :1]]
                 for x in (self.reference_points, self.deformed_points))
-        inverse = np.linalg.inv(a[..., :COORDINATES])  # the sheet is flat in the reference configuration
-        F = np.einsum("mij,mjk->mki", inverse, b)
+        first = a[:, 0] / np.linalg.norm(a[:, 0], axis=1, keepdims=True)
+        second = a[:, 1] - np.einsum("mi,mi->m", a[:, 1], first)[:, None] * first
+        second /= np.linalg.norm(second, axis=1, keepdims=True)
+        in_plane = np.einsum("mki,mji->mkj", a, np.stack([first, second], 1))
+        F = np.einsum("mij,mjk->mki", np.linalg.inv(in_plane), b)
         return np.linalg.svd(F, compute_uv=False)
+
+    @cached_property
+    def flat(self) -> bool:
+        """True if the surface lies in a plane z = constant in the reference configuration."""
+        sides = np.ptp(self.reference_points, axis=0)
+        return bool(sides[2] <= 1e-9 * sides.max())
 
     @property
     def wrinkled(self) -> np.ndarray:
@@ -95,37 +104,43 @@ class SheetWall(ColumnTable):
     def columns(self) -> dict[str, np.ndarray]:
         """Columns of the table that `to_csv` writes, with a row for each triangle: {name: values, shape (m,)}.
 
-        X, Y and x, y, z are the reference and deformed positions of the centroid, length, and `area` is the deformed
-        area. `wall` is the deformed thickness, length; `wall_ratio` is `wall` over the reference thickness. `stretch_1`
+        X, Y and x, y, z are the reference and deformed positions of the centroid, length; a surface that is not flat
+        in the reference configuration has Z, too. `area` is the deformed area. `wall` is the deformed thickness, length; `wall_ratio` is `wall` over the reference thickness. `stretch_1`
         and `stretch_2` are the larger and the smaller principal stretch. `wrinkled` is 1 in compression, else 0. For a
         sheet of several layers, `wall_of_NAME` is the deformed thickness of the layer NAME, length.
         """
         X, x = self.reference_points[self.triangles].mean(1), self.middle
         each = {f"wall_of_{name}": h * self.ratio for name, h in self.layers.items()}
-        return {"X": X[:, 0], "Y": X[:, 1], "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,
+        return {"X": X[:, 0], "Y": X[:, 1], **({} if self.flat else {"Z": X[:, 2]}), "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,
                 "wall": self.wall, "wall_ratio": self.ratio, "stretch_1": self.stretches[:, 0],
                 "stretch_2": self.stretches[:, 1], "wrinkled": self.wrinkled.astype(float),
                 **(each if len(each) > 1 else {})}
 
-    def thickness_at(self, x: float, y: float) -> float:
-        """Return the wall thickness at the node nearest to a position on the flat sheet.
+    def thickness_at(self, x: float, y: float, z: float | None = None) -> float:
+        """Return the wall thickness at the node nearest to a reference position.
 
         Args:
-            x: coordinate X on the flat sheet, length.
-            y: coordinate Y on the flat sheet, length.
+            x: coordinate X in the reference configuration, length.
+            y: coordinate Y in the reference configuration, length.
+            z: coordinate Z in the reference configuration, length; left out for a flat sheet.
 
         Returns:
             Deformed wall thickness, length.
 
         Raises:
-            InputError: a position off the sheet, such as in the quarter that is not modelled.
+            InputError: a position off the surface, such as in the quarter that is not modelled; no z for a surface that
+                is not flat.
         """
-        flat = self.reference_points[:, :COORDINATES]
-        away = np.hypot(*(flat - pair("thickness_at", (x, y))).T)
+        if z is None and not self.flat:
+            raise InputError("thickness_at: the surface is not flat in the reference configuration: give x, y and z")
+        place = pair("thickness_at", (x, y)) if z is None else triple("thickness_at", (x, y, z))
+        X = self.reference_points[:, :len(place)]
+        away = np.linalg.norm(X - place, axis=1)
         if away.min() > np.linalg.norm(np.diff(self.reference_points[self.triangles], axis=1), axis=2).max():
-            a, c, b, d = without_round_off([*flat.min(0), *flat.max(0)], flat)
-            raise InputError(f"thickness_at: ({x:.6g}, {y:.6g}) is not on the modelled sheet, X from {a:.4g} to {b:.4g}"
-                             f" and Y from {c:.4g} to {d:.4g}")
+            n, ends = len(place), without_round_off([*X.min(0), *X.max(0)], X)
+            spans = " and ".join(f"{axis} from {ends[k]:.4g} to {ends[n + k]:.4g}" for k, axis in enumerate("XYZ"[:n]))
+            raise InputError(f"thickness_at: ({', '.join(f'{v:.6g}' for v in place)}) is not on the modelled sheet,"
+                             f" {spans}")
         return float(self.at_nodes[np.argmin(away)])
 
     def mean_ratio(self, point: tuple[float, float, float], radius: float) -> float:
@@ -203,10 +218,11 @@ class SheetWall(ColumnTable):
         return dict(zip(("arc_length", "x", "y", "z", "wall"), np.array(found).T))
 
     def printed(self, size: float) -> list[np.ndarray]:
-        """Return the deformed lines of a square grid that is printed on the flat sheet.
+        """Return the deformed lines of a square grid that is printed on the surface.
 
-        On the flat sheet the lines are X = i size and Y = j size, with integers i and j. Each deformed line is a
-        polyline with a point at every edge of a triangle that it crosses.
+        On a flat sheet the lines are X = i size and Y = j size, with integers i and j. On another surface they are
+        R a = i size and Z = j size, with the angle a about the z axis and the largest distance R from it. Each deformed
+        line is a polyline with a point at every edge of a triangle that it crosses.
 
         Args:
             size: edge length of the squares, length.
@@ -219,14 +235,17 @@ class SheetWall(ColumnTable):
                 triangles.
         """
         size, found = positive("printed: size", size), []
-        sides = np.ptp(self.reference_points[:, :COORDINATES], axis=0)
+        X, period = self._unrolled()
+        sides = np.ptp(X, axis=0)
         if np.prod(sides) > 2 * MAX_RECTANGLES * size * size:
             raise InputError(f"printed: size = {size!r}: would make more than {2 * MAX_RECTANGLES} squares on the"
                              f" sheet, whose sides are {sides[0]:.4g} and {sides[1]:.4g}")
         edges = edges_of(self.triangles)[1]
         for axis in (0, 1):
-            a, b = self.reference_points[edges[:, 0]], self.reference_points[edges[:, 1]]
-            low, high = self.reference_points[:, axis].min(), self.reference_points[:, axis].max()
+            a, b = X[edges[:, 0]], X[edges[:, 1]].copy()
+            if period:                                       # the ends of an edge lie within half a turn
+                b[:, 0] = a[:, 0] + (b[:, 0] - a[:, 0] + period / 2) % period - period / 2
+            low, high = X[:, axis].min(), X[:, axis].max()
             for k in range(int(np.ceil(low / size)), int(np.floor(high / size)) + 1):
                 at = k * size + 1e-9 * size * (1 if k * size < (low + high) / 2 else -1)
                 cut = (a[:, axis] - at) * (b[:, axis] - at) < 0
@@ -237,6 +256,17 @@ class SheetWall(ColumnTable):
                 if len(line) > 1:
                     found.append(line)
         return found
+
+    def _unrolled(self) -> tuple[np.ndarray, float]:
+        """Return the coordinates on the surface of a printed grid, shape (n, 2), and the period of the first, length.
+
+        The period is 0 for a flat sheet.
+        """
+        X = self.reference_points
+        if self.flat:
+            return X[:, :2], 0.0
+        radius = float(np.hypot(*X[:, :2].T).max())
+        return np.column_stack([radius * np.arctan2(X[:, 1], X[:, 0]), X[:, 2]]), 2 * np.pi * radius
 
     def to_nodes(self, values: np.ndarray) -> np.ndarray:
         """Average values of triangles to nodes, weighted with the reference areas of the adjacent triangles.
@@ -274,17 +304,14 @@ def wall_of(path: Any, state: Any) -> SheetWall:
         now = forms.length * forms.w.x.array[dofs]
     cells = vectors.dofmap.list[own]
     X = vectors.tabulate_dof_coordinates()
-    middles = cell_node_positions(domain, own).mean(1)[:, :COORDINATES].T
+    middles = cell_node_positions(domain, own).mean(1).T
     h = {name: given(*middles) for name, given in problem.scene.thickness.items()}
     order = np.argsort(gathered(comm, domain.topology.original_cell_index[own]))
     rest, moved = (gathered(comm, part)[order].reshape(-1, 3) for part in (X[cells], X[cells] + now[cells]))
     keys = np.round(rest / max(problem.scene.extent), 10)
     _, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
-    triangles = row.reshape(-1, 3)
-    turned = _normals(rest[first][triangles])[:, 2] < 0
-    triangles[turned] = triangles[turned][:, ::-1]
     layers = {name: gathered(comm, values)[order] for name, values in h.items()}
-    return SheetWall(rest[first], moved[first], triangles, layers, comm)
+    return SheetWall(rest[first], moved[first], row.reshape(-1, 3), layers, comm)
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ from mpi4py import MPI
 
 from ...materials.constants import Varying
 from ...materials.material import Material
-from ...mesh.nodes import COORDINATES, cell_node_positions, own_cells
+from ...mesh.nodes import cell_node_positions, own_cells
 from ...scene.summary import text
 from ...values.table import Table
 from ...values.temperature import FunctionOfTemperature
@@ -147,7 +147,7 @@ def _mesh(problem: Any) -> dict[str, Any]:
     """
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = len(owned := own_cells(domain))
-    x = cell_node_positions(domain, owned)[..., :COORDINATES] / problem.forms.length
+    x = cell_node_positions(domain, owned) / problem.forms.length
     number = domain.topology.original_cell_index[:cells]
     weights = np.sin(1.0 + number)[:, None] * np.sin(1.0 + np.arange(x.shape[1]))
     total = comm.allreduce(cells, MPI.SUM)
