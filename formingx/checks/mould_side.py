@@ -81,7 +81,8 @@ def _covers_face(scene: Scene, contact: Contact) -> bool:
     if opposite is None or opposite not in scene.mesh.boundaries:
         return False
     if scene.kinematics.components == 3:
-        points, directions = scene.mesh.outward(contact.on)
+        surface: Any = scene.mesh
+        points, directions = surface.outward(contact.on)
     else:
         points = np.unique(scene.mesh.nodes_of(contact.on), axis=0)
         points, directions = outward_directions(points, scene.mesh.nodes_of(opposite))

@@ -1,6 +1,7 @@
 """Checks of a scene before a run: mesh, penalties, orders of magnitude, targets."""
 
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 from mpi4py import MPI
@@ -35,8 +36,9 @@ def _edges(body: Body) -> Iterator[Finding]:
     A flat membrane has no stiffness normal to its plane.
     """
     if body.scene.kinematics.components == 3:
+        mesh: Any = body.scene.mesh
         supported = {support.on for support in body.scene.supports}
-        for name in sorted({*body.scene.mesh.boundaries} - {*body.scene.mesh.faces} - supported):
+        for name in sorted({*mesh.boundaries} - {*mesh.faces} - supported):
             yield Finding("warning", f"boundary {name!r}", f"nothing holds this edge of the sheet: a symmetry cut"
                           f" (part='quarter') needs Symmetry({name!r}, {'y' if name == 'y0' else 'x'!r})")
 

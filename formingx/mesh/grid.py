@@ -76,7 +76,8 @@ def gathered(mesh: Mesh) -> Grid:
     cells = numbers[np.asarray(_compat.cell_nodes(domain))[:owned]]
     marks = {name: mesh.cells.find(tag) for name, tag in mesh.layers.items()}
     ends = {name: facet_nodes(domain, mesh.facets_of(name))[:, :2] for name in mesh.boundaries}
-    parts = comm.allgather((numbers, X[:, :domain.geometry.dim], {name: cells[found[found < owned]] for name, found in marks.items()},
+    tagged = {name: cells[found[found < owned]] for name, found in marks.items()}
+    parts = comm.allgather((numbers, X[:, :domain.geometry.dim], tagged,
                             {name: numbers[found] for name, found in ends.items()}))
     points = np.zeros((domain.geometry.index_map().size_global, domain.geometry.dim))
     for number, x, _, _ in parts:

@@ -63,7 +63,7 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
                 except RuntimeError:                 # the point is far from a curved cell
                     continue
                 inside = min(*place, 1 - place.sum())
-                if dim < mesh.geometry.dim:                  # a surface: the point may lie off the plane of the triangle
+                if dim < mesh.geometry.dim:                  # a surface: the point may lie off its triangle
                     away = np.linalg.norm(cmap.push_forward(place[None], X[nodes[cell]])[0] - point)
                     inside = min(inside, -away / np.ptp(X[nodes[cell]], axis=0).max())
                 if inside > depth[i]:

@@ -35,7 +35,7 @@ def arguments(function: Callable, coordinates: Mapping[str, np.ndarray]) -> dict
         {name: values} of the first coordinates, as many as the function has positional arguments without a default.
     """
     try:
-        taken = inspect.signature(function).parameters.values()
+        taken = list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):                         # a function of NumPy, for example, has no signature
         taken = []
     positional = [p for p in taken if p.kind in (p.POSITIONAL_ONLY, p.POSITIONAL_OR_KEYWORD)]

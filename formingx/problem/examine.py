@@ -165,7 +165,8 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
             total = comm.allreduce(float(np.sum(part**2)), MPI.SUM)
             residual[name] = float(np.sqrt(total)) / scale if np.isfinite(total) else np.inf
     sizes = np.nan_to_num(np.linalg.norm(values[dofs], axis=1), nan=np.inf)
-    mine = (float(sizes.max(initial=-1.0)), points[np.argmax(sizes)].tolist() if len(sizes) else [0.0] * points.shape[1])
+    at = points[np.argmax(sizes)].tolist() if len(sizes) else [0.0] * points.shape[1]
+    mine = (float(sizes.max(initial=-1.0)), at)
     point = np.array(max(comm.allgather(mine))[1])
     return residual, place(problem.scene.mesh, point), point
 

@@ -23,8 +23,8 @@ def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | 
         temperature: temperature of the scene, or None.
 
     Returns:
-        Reference positions of q points in each of m cells, shape (m q, 2 or 3), length. Local numbers of the cells, shape
-        (m,), positions in the reference cell, shape (q, 2), and temperatures, shape (m q,) or None.
+        Reference positions of q points in each of m cells, shape (m q, 2 or 3), length. Local numbers of the cells,
+        shape (m,), positions in the reference cell, shape (q, 2), and temperatures, shape (m q,) or None.
     """
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])

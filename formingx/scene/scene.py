@@ -414,7 +414,7 @@ class Scene:
 
     @property
     def extent(self) -> np.ndarray:
-        """Extent of the body along R and Z, in three dimensions x, y and z, shape (2 or 3,), length, equal on all ranks."""
+        """Extent of the body along R and Z, in three dimensions x, y and z, shape (2 or 3,), length."""
         return self._extent
 
     def __str__(self) -> str:

@@ -111,7 +111,7 @@ def write_nodes(path: Any, file: Any, *, state: Any = None, mesh: str | os.PathL
     mesh_grid = meshes.to_grid(path.problem.scene.mesh) if mesh is None else grid.read(mesh)
     points = mesh_grid.points[:, :len(_coordinates(path))]
     u = _displacements(path, state, points)
-    rows = [[int(n), *X, *v] for n, X, v in zip(mesh_grid.numbers, points.tolist(), u.tolist())]
+    rows = [[int(n), *row] for n, row in zip(mesh_grid.numbers, np.hstack([points, u]).tolist())]
     files.write_rows(file, ["node", *_columns(path)], rows, path.problem.comm)
 
 
@@ -172,7 +172,8 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
                 raise InputError(f"{table.name}: node {node} is not in the mesh file {os.fspath(mesh)!r}")
         points = mesh_grid.points[[rows[int(n)] for n in nodes]]
     ours = _displacements(path, state, points)
-    return NodalComparison(nodes, points, ours, np.column_stack([column(c) for c in _columns(path)[len(_coordinates(path)):]]),
+    displacements = _columns(path)[len(_coordinates(path)):]
+    return NodalComparison(nodes, points, ours, np.column_stack([column(c) for c in displacements]),
                            float(np.linalg.norm(ours, axis=1).max()))
 
 

@@ -6,9 +6,9 @@ from ...contact.tooling import register_tools, tool_of
 from ...mesh.files import SurfaceReader, surface_readers
 from ...physics.kinematics import ThreeD
 from . import scene_checks
-from .reader import SheetReader
 from .curved import revolved as revolved_surface
 from .curved import stl_grid, surface, tube
+from .reader import SheetReader
 from .sheet import circle, rectangle, sheet
 from .solid_tool import SolidTool, Swept, box, extruded, revolved
 from .surface import Surface

@@ -60,7 +60,8 @@ def tube(*, radius: float, length: float, elements: tuple[int, int], part: str =
     angle = np.maximum(s - (L - R), 0.0) / R
     line = np.column_stack([R * np.cos(angle), z - np.minimum(s, L - R) - R * np.sin(angle)])
     line[-1, 0] = 0.0
-    return revolved(line, elements=(None, elements[1]), part=part, layers=layers, comm=comm)
+    meridian = [(float(r), float(h)) for r, h in line]
+    return revolved(meridian, elements=(None, elements[1]), part=part, layers=layers, comm=comm)
 
 
 def revolved(meridian: Sequence[tuple[float, float]], *, elements: tuple[int | None, int], part: str = "whole",
@@ -85,7 +86,7 @@ def revolved(meridian: Sequence[tuple[float, float]], *, elements: tuple[int | N
 
     >>> preform = fx.mesh.revolved([(10, 0), (10, -80), (7, -88), (0, -91)], elements=(30, 16))
     >>> list(preform.boundaries), round(preform.enclosed_volume())
-    (['neck', 'inner', 'outer'], 26794)
+    (['neck', 'inner', 'outer'], 26389)
     """
     along, round_ = _numbers("revolved", elements)
     check_name("revolved: part", part, tuple(_SWEEP))
@@ -211,14 +212,15 @@ def _grid(line: np.ndarray, columns: int, part: str) -> Grid:
     odd = np.add.outer(np.arange(len(rings) - 1), np.arange(columns)) % 2 == 1       # diagonals alternate
     pairs = np.where(odd[..., None, None], np.stack([np.stack([a, d, c], -1), np.stack([a, c, b], -1)], -2),
                      np.stack([np.stack([a, d, b], -1), np.stack([d, c, b], -1)], -2))
-    cells = pairs.reshape(-1, 3)
+    cells: np.ndarray = pairs.reshape(-1, 3)
     if closed:
         tip = np.full(columns, len(points) - 1)
         cells = np.vstack([cells, np.column_stack([left[-1], tip, right[-1]])])
     boundaries = {"neck": np.column_stack([left[0], right[0]])}
     if not closed:
         boundaries["end"] = np.column_stack([left[-1], right[-1]])
-    for name, column in zip({"whole": (), "half": ("x0", "x0"), "quarter": ("y0", "x0")}[part], (row[:, 0], row[:, -1])):
+    cuts = {"whole": (), "half": ("x0", "x0"), "quarter": ("y0", "x0")}[part]
+    for name, column in zip(cuts, (row[:, 0], row[:, -1])):
         side = np.append(column, len(points) - 1) if closed else column
         edges = np.column_stack([side[:-1], side[1:]])
         boundaries[name] = np.vstack([boundaries[name], edges]) if name in boundaries else edges

@@ -38,8 +38,8 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
     """
     mesh = scene.mesh
     if not isinstance(mesh, SurfaceMesh):
-        raise InputError("Scene: mesh: a mesh in three dimensions must come from fx.mesh.sheet, tube, revolved, surface or"
-                         " read")
+        raise InputError("Scene: mesh: a mesh in three dimensions must come from fx.mesh.sheet, tube, revolved, surface"
+                         " or read")
     if given is None:
         raise InputError("Scene: a sheet in three dimensions needs a thickness=...: a length, a function of (x, y) or"
                          " (x, y, z), or {layer: ...}")
@@ -56,8 +56,8 @@ def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
     found: dict[str, Callable] = {}
     for name, h in each.items():
         if callable(h):
-            found[name] = h if isinstance(h, _OfPosition) else _OfPosition(h)
-            call_on_all_ranks(mesh.comm, [partial(_check, name, found[name], X)])
+            found[name] = function = h if isinstance(h, _OfPosition) else _OfPosition(h)
+            call_on_all_ranks(mesh.comm, [partial(_check, name, function, X)])
         else:
             found[name] = _Constant(positive(f"Scene: thickness of {name!r}", h))
     return found

@@ -110,7 +110,8 @@ def circle(radius: float, *, part: str = "whole") -> list[Edge]:
 
 
 def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, names: Sequence[str] | None = None,
-          layers: Sequence[str] = ("sheet",), reflected: Sequence[str] = (), comm: MPI.Comm = MPI.COMM_WORLD) -> SurfaceMesh:
+          layers: Sequence[str] = ("sheet",), reflected: Sequence[str] = (),
+          comm: MPI.Comm = MPI.COMM_WORLD) -> SurfaceMesh:
     """Mesh a flat sheet in the plane z = 0 with triangles within an outline, by gmsh.
 
     Args:

@@ -40,8 +40,8 @@ def read_stl(name: str, caller: str = "solid") -> tuple[np.ndarray, np.ndarray]:
         except ValueError:
             raise InputError(f"{caller}: {name!r} is no STL file: a vertex is not three numbers") from None
     if len(points) < 12 or len(points) % 3 or not np.isfinite(points).all():
-        raise InputError(f"{caller}: {name!r} is no STL file of a surface: it has {len(points)} corners of triangles, which"
-                         f" must be finite and at least 12")
+        raise InputError(f"{caller}: {name!r} is no STL file of a surface: it has {len(points)} corners of triangles,"
+                         f" which must be finite and at least 12")
     return merged(points, np.arange(len(points)).reshape(-1, 3))
 
 

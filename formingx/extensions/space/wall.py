@@ -105,13 +105,15 @@ class SheetWall(ColumnTable):
         """Columns of the table that `to_csv` writes, with a row for each triangle: {name: values, shape (m,)}.
 
         X, Y and x, y, z are the reference and deformed positions of the centroid, length; a surface that is not flat
-        in the reference configuration has Z, too. `area` is the deformed area. `wall` is the deformed thickness, length; `wall_ratio` is `wall` over the reference thickness. `stretch_1`
-        and `stretch_2` are the larger and the smaller principal stretch. `wrinkled` is 1 in compression, else 0. For a
-        sheet of several layers, `wall_of_NAME` is the deformed thickness of the layer NAME, length.
+        in the reference configuration has Z, too. `area` is the deformed area. `wall` is the deformed thickness,
+        length; `wall_ratio` is `wall` over the reference thickness. `stretch_1` and `stretch_2` are the larger and the
+        smaller principal stretch. `wrinkled` is 1 in compression, else 0. For a sheet of several layers, `wall_of_NAME`
+        is the deformed thickness of the layer NAME, length.
         """
         X, x = self.reference_points[self.triangles].mean(1), self.middle
         each = {f"wall_of_{name}": h * self.ratio for name, h in self.layers.items()}
-        return {"X": X[:, 0], "Y": X[:, 1], **({} if self.flat else {"Z": X[:, 2]}), "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,
+        height = {} if self.flat else {"Z": X[:, 2]}
+        return {"X": X[:, 0], "Y": X[:, 1], **height, "x": x[:, 0], "y": x[:, 1], "z": x[:, 2], "area": self.area,
                 "wall": self.wall, "wall_ratio": self.ratio, "stretch_1": self.stretches[:, 0],
                 "stretch_2": self.stretches[:, 1], "wrinkled": self.wrinkled.astype(float),
                 **(each if len(each) > 1 else {})}

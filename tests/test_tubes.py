@@ -1,0 +1,201 @@
+"""Curved surfaces in three dimensions: meshes, files, forms, walls, and inflation against membrane theory."""
+
+import numpy as np
+import pytest
+from conftest import run_json
+from membrane_of_revolution import LENGTH, limit_point
+from test_derivatives import assert_derivatives, difference, random_state
+
+import formingx as fx
+from formingx.io.stl import write_stl
+from formingx.problem.problem import Problem
+
+CAPPED = {"radius": 16.0, "length": 100.0, "elements": (12, 4), "part": "quarter", "end": "closed"}
+SYMMETRIES = {"quarter": [fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")], "half": [fx.Symmetry("x0", "x")],
+              "whole": []}
+
+
+def scene(mesh=None, part="quarter", material=None, thickness=0.5, **more):
+    """A closed tube that hangs from its neck under a pressure inside."""
+    mesh = fx.mesh.tube(**CAPPED | {"part": part}) if mesh is None else mesh
+    return fx.Scene(mesh=mesh, thickness=thickness, materials=material or fx.NeoHookean(c10=0.5),
+                    supports=[fx.Clamped("neck"), *SYMMETRIES[part]],
+                    **{"loads": [fx.Pressure("inner")]} | more)
+
+
+def held_tube(elements, part="quarter", thickness=0.025):
+    """A tube of radius 1 and length 4 whose ends are held."""
+    mesh = fx.mesh.tube(radius=1.0, length=LENGTH, elements=elements, part=part)
+    return fx.Scene(mesh=mesh, thickness=thickness, materials=fx.NeoHookean(c10=0.5),
+                    supports=[fx.Clamped("neck"), fx.Clamped("end"), *SYMMETRIES[part]], loads=[fx.Pressure("inner")])
+
+
+def limit_of(elements, part="quarter"):
+    """Limit pressure R / (mu H), and the volume there over the first one, of the tube in three dimensions."""
+    path = fx.trace(held_tube(elements, part), until=fx.enclosed_volume(30.0), progress=False)
+    (limit,) = path.limit_points
+    first = path.problem.scene.mesh.enclosed_volume() * path.problem.scene.symmetry_factor
+    return limit.measures["pressure"] / 0.025, 1 + limit.measures["enclosed_volume"] / first
+
+
+def test_free_inflation_converges_to_membrane_theory():
+    """A ring of chords of half angle a carries 1/cos(a) times the pressure of a circle; the rest is of second order."""
+    pressure, volume = limit_point()
+    assert (pressure, volume) == (pytest.approx(0.91071, abs=1e-5), pytest.approx(2.7368, abs=2e-4))
+    coarse, fine = (np.array(limit_of(elements)) / (pressure, volume) - 1 for elements in ((14, 4), (27, 8)))
+    assert 0 < fine[0] < 7e-3 and abs(fine[1]) < 1e-3
+    assert np.log2(coarse[0] / fine[0]) == pytest.approx(2, abs=0.2)
+    assert fine[0] - (1 / np.cos(np.pi / 32) - 1) == pytest.approx(1.7e-3, abs=1e-4)
+
+
+@pytest.mark.thorough
+def test_free_inflation_on_a_fine_mesh_and_parts():
+    pressure, volume = limit_point()
+    fine = np.array(limit_of((53, 16))) / (pressure, volume) - 1
+    assert 0 < fine[0] < 2e-3 and abs(fine[1]) < 2e-4
+    quarter, half, whole = (limit_of((20, columns), part) for columns, part in (
+        (6, "quarter"), (12, "half"), (24, "whole")))
+    assert half == pytest.approx(quarter, rel=1e-6) and whole == pytest.approx(quarter, rel=1e-6)
+
+
+@pytest.mark.parametrize("material", [fx.NeoHookean(c10=2.0), pytest.param(
+    fx.Viscoelastic(fx.NeoHookean(c10=0.5), [(1.0, 1.0)]), marks=pytest.mark.thorough)])
+def test_residual_and_tangent_are_derivatives(material):
+    mesh = fx.mesh.tube(radius=1.0, length=2.0, elements=(3, 3), part="quarter", end="closed")
+    problem = Problem(scene(mesh, material=material, thickness=0.1, model=fx.Membrane(wrinkles=0.01)))
+    assert_derivatives(problem, *random_state(problem, size=0.05))
+
+
+@pytest.mark.parametrize("on", ["inner", "outer"])
+def test_pressure_does_the_work_p_dV(on):
+    problem = Problem(scene(loads=[fx.Pressure(on)]))
+    forms, (x, d) = problem.forms, random_state(problem, size=0.05)
+    volume, derivative = fx.enclosed_volume(1.0).bind(problem), problem.x.duplicate()
+    problem.control_derivative(x, 0.0, derivative)
+    work = -derivative.dot(d) * forms.stress * forms.volume * problem.scene.symmetry_factor / forms.control_scale
+    assert work == pytest.approx(difference(lambda y: volume.value(y, 0.0), x, d, 1e-5), rel=1e-8)
+
+
+def test_swept_volume_is_the_change_of_the_volume_with_flat_lids():
+    path = fx.trace(held_tube((8, 4)), until=fx.enclosed_volume(5.0), progress=False)
+    wall, mesh = path.wall(), path.problem.scene.mesh
+    from formingx.extensions.space.surface_mesh import volume_within
+    assert 4 * volume_within(wall.reference_points, wall.triangles) == pytest.approx(4 * mesh.enclosed_volume())
+    assert 4 * (volume_within(wall.deformed_points, wall.triangles) - mesh.enclosed_volume()) == pytest.approx(5.0)
+
+
+def test_meshes_of_parts_have_named_edges_and_faces():
+    for part, edges in (("whole", []), ("half", ["x0"]), ("quarter", ["x0", "y0"])):
+        mesh = fx.mesh.tube(radius=2.0, length=9.0, elements=(6, 8), part=part, z=1.0)
+        assert list(mesh.boundaries) == ["neck", "end", *edges, "inner", "outer"] and not mesh.flat
+        assert np.ptp(mesh.nodes_of("neck")[:, 2]) == 0 and mesh.nodes_of("end")[0, 2] == -8.0
+        for edge in edges:
+            assert np.abs(mesh.nodes_of(edge)[:, "xy".index(edge[0])]).max() < 1e-12
+        points, normals = mesh.outward("outer")
+        assert np.einsum("ni,ni->n", points[:, :2], normals[:, :2]).min() > 1.9
+        n = 8 * {"whole": 1, "half": 2, "quarter": 4}[part]
+        assert mesh.enclosed_volume() * n / 8 == pytest.approx(9 * n / 2 * 4 * np.sin(2 * np.pi / n))
+    closed = fx.mesh.tube(**CAPPED)
+    assert list(closed.boundaries) == ["neck", "x0", "y0", "inner", "outer"]
+    points, normals = closed.outward("inner")
+    assert normals[np.argmin(points[:, 2]), 2] > 0.8
+    assert fx.mesh.sheet([(0, 0), (1, 0), (1, 1)], size=0.5).flat
+
+
+def test_arc_length_of_a_meridian_gives_a_thickness():
+    mesh = fx.mesh.revolved([(10, 0), (10, -20), (4, -28), (0, -28)], elements=(17, 6), part="quarter")
+    assert mesh.arc_length([10.0, 10.0, 4.0], [0, 0, 0], [-7, -20, -28]) == pytest.approx([7, 20, 30], abs=0.05)
+    path = fx.trace(scene(mesh, thickness=lambda x, y, z: 1 + 0.1 * mesh.arc_length(x, y, z)), progress=False,
+                    until=fx.enclosed_volume(1.0))
+    wall = path.wall()
+    assert wall.thickness_at(10.0, 0.0, 0.0) < wall.thickness_at(0.0, 0.0, -28.0)
+    assert wall.reference_thickness.max() == pytest.approx(1 + 0.1 * (34 - 4 / 3), rel=0.002)
+    with pytest.raises(fx.InputError, match="not flat in the reference configuration"):
+        wall.thickness_at(10.0, 0.0)
+    with pytest.raises(fx.InputError, match="has no meridian"):
+        fx.mesh.sheet([(0, 0), (1, 0), (1, 1)], size=0.5).arc_length([0.0], [0.0], [0.0])
+
+
+def test_surfaces_from_files_and_arrays_equal_the_mesh(tmp_path):
+    mesh = fx.mesh.tube(**CAPPED)
+    points, triangles = mesh.whole()
+    fx.mesh.write(mesh, tmp_path / "tube.msh")
+    write_stl(points, triangles, tmp_path / "tube.stl")
+    for found in (fx.mesh.read(tmp_path / "tube.msh"), fx.mesh.read(tmp_path / "tube.stl"),
+                  fx.mesh.surface(points, triangles)):
+        assert sorted(found.boundaries) == sorted(mesh.boundaries)
+        for name in mesh.boundaries:
+            assert found.nodes_of(name) == pytest.approx(mesh.nodes_of(name), abs=1e-5)
+        assert found.enclosed_volume() == pytest.approx(mesh.enclosed_volume(), rel=1e-6)
+    large = fx.mesh.read(tmp_path / "tube.stl", scale=25.4)
+    assert large.enclosed_volume() == pytest.approx(25.4**3 * mesh.enclosed_volume(), rel=1e-6)
+    low = fx.mesh.tube(radius=1.0, length=4.0, elements=(4, 8))
+    assert list(fx.mesh.surface(*low.whole()).boundaries) == ["neck", "end", "inner", "outer"]
+
+
+P = [(1, 0, 0), (0, 1, 0), (-1, 0, 0), (0, -1, 0), (0, 0, -1)]
+CONE = [(4, 1, 0), (4, 2, 1), (4, 3, 2), (4, 0, 3)]
+
+
+@pytest.mark.parametrize("make, words", [
+    (lambda: fx.mesh.tube(radius=-1.0, length=4.0, elements=(4, 8)), "tube: radius = -1.0"),
+    (lambda: fx.mesh.tube(radius=1.0, length=0.5, elements=(4, 8), end="closed"), "at least the radius"),
+    (lambda: fx.mesh.tube(radius=1.0, length=4.0, elements=(4, 2)), "at least 3 for the whole"),
+    (lambda: fx.mesh.revolved([(1, 0), (0, -1), (1, -2)], elements=(None, 8)), "only the last point may lie on"),
+    (lambda: fx.mesh.surface(P, [*CONE[:3], (4, 3, 0)]), "look to different sides of the surface at"),
+    (lambda: fx.mesh.surface(P, [*CONE[:3], (4, 0, 9)]), "three numbers of points each, from 0 to 4"),
+    (lambda: fx.mesh.surface([*P, (0, 0, -1)], [*CONE[:3], (5, 0, 3)]), "two nodes lie at"),
+    (lambda: fx.mesh.surface([*P, (5, 5, 5), (6, 5, 5), (5, 6, 5)], [*CONE, (5, 6, 7)]), "the body is in pieces"),
+    (lambda: fx.mesh.surface(P, CONE, {"inner": [(0, 1)]}), "not that of a face"),
+    (lambda: fx.mesh.surface(P, CONE, {"rim": [(0, 2)]}), "rim"),
+    (lambda: scene(loads=[fx.Pressure("neck")]), "takes a pressure on its 'inner' or its 'outer'"),
+    (lambda: scene(thickness=lambda x, y, z: 1 + z / 50), r"at \(.*, .*, -100\): must be greater than 0"),
+])
+def test_errors_name_what_is_wrong(make, words):
+    with pytest.raises(fx.InputError, match=words):
+        if make() is not None and words == "rim":
+            raise fx.InputError("rim is no edge of an element and has no facet")
+
+
+def test_wall_part_and_printed_lines_of_a_tube(tmp_path):
+    path = fx.trace(scene(), until=fx.enclosed_volume(4e4), progress=False)
+    wall, part = path.wall(), path.part(density=0.95)
+    assert part.volume == pytest.approx(4 * (wall.reference_area * 0.5).sum())
+    assert len(part.min_wall_reference) == 3 and "(X, Y, Z)" in str(part)
+    wall.to_csv(tmp_path / "wall.csv")
+    assert (tmp_path / "wall.csv").read_text().startswith("X,Y,Z,x,y,z,area,wall")
+    lines = wall.printed(8.0)
+    assert len(lines) == 3 + 13 and all(len(line) > 3 for line in lines)
+
+
+def test_temperature_and_constants_may_depend_on_the_height():
+    hot = scene(material=fx.NeoHookean(c10=lambda x, y, z: 0.5 - z / 100), temperature=lambda x, y, z: 150 + z)
+    assert hot.temperature.T.x.array.min() == pytest.approx(50.0)
+    assert hot.shear_modulus("sheet") == pytest.approx(3.0, rel=0.05)
+
+
+def test_a_mirror_plane_normal_to_z_doubles_the_tube_unless_it_guides():
+    mesh = fx.mesh.tube(radius=16.0, length=50.0, elements=(4, 3), part="quarter")
+    for guide, factor in ((False, 8), (True, 4)):
+        found = fx.Scene(mesh=mesh, thickness=1.0, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
+                         supports=[fx.Clamped("neck"), fx.Symmetry("end", "z", guide=guide), *SYMMETRIES["quarter"]])
+        assert found.symmetry_factor == factor
+
+
+@pytest.mark.thorough
+def test_ranks():
+    script = """
+import json, sys
+sys.path.insert(0, "tests")
+import formingx as fx
+from test_tubes import scene
+path = fx.trace(scene(), until=fx.enclosed_volume(4e4), progress=False)
+wall, mesh = path.wall(), path.problem.scene.mesh
+at = path.state_at(fx.displacement(1.0, at=(16.0, 0.0, float(mesh.meridian[4, 1])), component="x"))
+found = [[mesh.enclosed_volume(), at.measures["pressure"]], mesh.whole()[0].sum(0).tolist(), wall.ratio.tolist(),
+         path["pressure"].tolist(), wall.section((0, 0, -50), (0, 0, 1))["wall"].tolist()]
+if path.problem.comm.rank == 0:
+    print(json.dumps(found))
+"""
+    for one, two in zip(*(run_json(script, ranks) for ranks in (1, 3))):
+        np.testing.assert_allclose(two, one, rtol=1e-9, atol=1e-10)
