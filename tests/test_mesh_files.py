@@ -151,7 +151,6 @@ BAD = {
     "no elements": (changed((SQUARE[SQUARE.index("$Elements"):], "$Elements\n0\n$EndElements\n")), "was it meshed"),
     "3-D": (changed(("4\n1 1 2 2", "5\n1 1 2 2"), ("$EndElements", "5 4 2 0 1 1 2 3 4\n$EndElements")),
             "three-dimensional"),
-    "out of the plane": (changed(("3 1 1 0", "3 1 1 0.5")), "not a plane section: z goes from 0 to 0.5"),
     "quads": (QUADS, "group 'sheet' has elements of 4 nodes .*formingx needs triangles of 3 or 6"),
     "triangles and quads": (changed(("4\n1 1 2 2", "5\n1 1 2 2"), ("$EndElements", "5 3 2 1 1 1 2 3 4\n$EndElements")),
                             "formingx needs triangles"),

@@ -338,7 +338,7 @@ def test_axes_of_a_sheet_in_three_dimensions_are_x_and_y(tmp_path):
             disc(**given)
     (tmp_path / "T.csv").write_text("x,T\n0,100\n2,120\n")
     assert disc(material=warm, temperature=tmp_path / "T.csv").temperature.T.x.array.max() == pytest.approx(110)
-    for text, words in (("R,T\n0,100\n2,120\n", "must have T, and one or more of x, y, z"),
+    for text, words in (("R,T\n0,100\n2,120\n", "must have T, and x, y, z, one or more of them"),
                         ("x,T\n0,100\n2,120\n0,110\n", "two temperatures, 100 and 110, at x = 0")):
         (tmp_path / "T.csv").write_text(text)
         with pytest.raises(fx.InputError, match=words):

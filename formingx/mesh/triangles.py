@@ -24,6 +24,16 @@ class Place(NamedTuple):
     boundary: str
     distance: float
 
+    @property
+    def R(self) -> float:
+        """First reference coordinate, R of a section, length."""
+        return self.position[0]
+
+    @property
+    def Z(self) -> float:
+        """Second reference coordinate, Z of a section, length."""
+        return self.position[1]
+
     def __str__(self) -> str:
         layer = f" in layer {self.layer!r}" if self.layer else ""
         axes = "(R, Z)" if len(self.position) == 2 else "(x, y, z)"

@@ -125,8 +125,8 @@ def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
     table = csv_files.read(file)
     axes = [k for k, name in enumerate(names) if name in table.columns]
     if not axes:
-        raise InputError(f"{table.name}: has the columns {', '.join(table.columns)}: must have T, and one or more of"
-                         f" {', '.join(names)}")
+        raise InputError(f"{table.name}: has the columns {', '.join(table.columns)}: must have T, and"
+                         f" {', '.join(names)}{' or both' if len(names) == 2 else ', one or more of them'}")
     for name in ("T", *(names[k] for k in axes)):
         if name in table.units and table.units[name] is not None:
             raise InputError(f"{table.name}: column {name!r} is in {table.units[name]!r}: a temperature is read as it"

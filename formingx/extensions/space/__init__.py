@@ -6,15 +6,12 @@ from ...contact.tooling import register_tools, tool_of
 from ...mesh.files import SurfaceReader, surface_readers
 from ...physics.kinematics import ThreeD
 from . import scene_checks
-from .curved import revolved as revolved_surface
-from .curved import stl_grid, surface, tube
+from .curved import stl_grid
 from .reader import SheetReader
-from .sheet import circle, rectangle, sheet
-from .solid_tool import SolidTool, Swept, box, extruded, revolved
+from .solid_tool import SolidTool, Swept
 from .surface import Surface
 from .surface_mesh import of_plain
-from .triangulated import solid
-from .union import Union, union
+from .union import Union
 
 
 class _StoredFileTool(SolidTool):
