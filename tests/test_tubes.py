@@ -130,7 +130,7 @@ def test_surfaces_from_files_and_arrays_equal_the_mesh(tmp_path):
     large = fx.mesh.read(tmp_path / "tube.stl", scale=25.4)
     assert large.enclosed_volume() == pytest.approx(25.4**3 * mesh.enclosed_volume(), rel=1e-6)
     fx.mesh.write(fx.mesh.disc(radius=2.0, thickness=0.5, elements=(3, 1)), tmp_path / "disc.msh")
-    text = (tmp_path / "disc.msh").read_text().replace("1 0.0 0.0 0\n", "1 0.0 0.0 0.5\n")
+    text = (tmp_path / "disc.msh").read_text().replace("\n3 0.0 0.0 0\n", "\n3 0.0 0.0 0.5\n")
     (tmp_path / "disc.msh").write_text(text)
     with pytest.raises(fx.InputError, match="not a plane section: z goes from 0 to 0.5.* triangles of three nodes"):
         fx.mesh.read(tmp_path / "disc.msh")
