@@ -73,3 +73,17 @@ def test_a_rough_ball_pulls_only_where_it_is_withdrawn_or_another_load_acts():
     path = fx.trace(scene := pushed(friction=0.1), until=fx.force(5.0), progress=False)
     with pytest.raises(fx.ConvergenceError):
         fx.trace(scene, until=fx.force(-1.0), start=path, progress=False)
+
+
+def test_a_positive_force_that_compresses_is_noted():
+    """The force of the body on a support is positive where the support presses; the run says so, and what pulls."""
+    def run(force):
+        mesh = fx.mesh.disc(radius=1.0, thickness=1.0, elements=(1, 1))
+        scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=0.5), supports=[
+            fx.Symmetry("axis"), fx.Symmetry("bottom", "z"), fx.PrescribedDisplacement("top", name="pull")])
+        return fx.trace(scene, until=fx.force(force), progress=False)
+    pressed, pulled = run(0.7), run(-0.7)
+    assert pressed["travel"][-1] < 0 < pulled["travel"][-1]
+    note, = (found for found in pressed.findings() if found.about == "pull")
+    assert note.severity == "note" and "presses" in note.text and "force(-0.7)" in note.advice
+    assert not [found for found in pulled.findings() if found.about == "pull"]

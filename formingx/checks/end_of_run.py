@@ -50,3 +50,22 @@ def equilibrium(path: Any) -> Iterator[Finding]:
     """Report compression of a membrane, and a snap-through that changes the wall, in a `Path`; collective."""
     yield from tension.findings(tension.first_compression(path))
     yield from snaps.findings(snaps.largest(path))
+
+
+@register("end")
+def force_signs(path: Any) -> Iterator[Finding]:
+    """Note a support that moved to negative values to reach a positive force: the force of the body on it."""
+    scene = path.scene
+    for state in path.states:
+        if state.target is None or not state.target.name.endswith("force") or not state.target.value > 0:
+            continue
+        of = state.target.name.removesuffix("_force")
+        for number, item in enumerate(scene.items):
+            if item in scene.contacts or item not in scene.drivable or item.quantity != "travel":
+                continue
+            setting = state.setting
+            travel = setting["base"][number] + setting["rate"][number] * state.control
+            if travel < 0 and setting["rate"][number] and of in ("force", item.name):
+                yield Finding("note", item.name or "support", f"{state.target} is the force of the body on the support"
+                              f" {item.name or item.on!r}, which moved in the negative direction to reach it and"
+                              f" presses the body", f"To move it the other way, give force({-state.target.value:g}).")

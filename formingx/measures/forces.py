@@ -61,10 +61,12 @@ def support_factor(scene: Any, support: Any) -> int:
 
 
 def force(value: float, *, of: str | None = None) -> Target:
-    r"""Return the target that the force of the body on a controlled support or tool reaches a value.
+    r"""Return the target for the force of the body on a support (negative where it pulls) or tool (positive).
 
-    The force on a support counts along the driven component. The force on a tool counts against its motion m, positive
-    when it resists. With the tractions t of the body on the tool
+    It is the force of the body on the support or tool, not the force that moves it. On a support it counts along the
+    driven component: a support that pulls the body in +z has a negative force, one that moves in -z and compresses it a
+    positive one. On a tool it counts against its motion m, positive when the body resists. With the tractions t of the
+    body on the tool
 
     .. math:: F = -\frac{m}{|m|} \cdot \int_{\Gamma_c} t \, dA
 
