@@ -1,8 +1,9 @@
 #!/bin/sh
 # ./fx CMD [ARG...]: run CMD where DOLFINx >= 0.9 is. Status, signals, arguments, stdin and files pass through.
-#   1. inside already, or a Debian root built earlier   2. this machine's own Python, if it has all that is needed
-#   3. docker or podman, if an engine answers            4. else build a Debian root, once, and use it
-# FX=native|docker|podman|root|copy forces one way; FX_SUITE=sid picks another Debian; FX_CACHE=DIR holds the roots.
+#   1. inside already, or .venv in this folder, if it has DOLFINx   2. a Debian root built earlier
+#   3. this machine's own Python, if it has all that is needed       4. docker or podman, if an engine answers
+#   5. else build a Debian root, once, and use it
+# FX=venv|native|docker|podman|root|copy forces one way; FX_SUITE=sid picks another Debian; FX_CACHE=DIR holds the roots.
 # The list of packages is the Dockerfile's.
 # shellcheck disable=SC2016,SC2064,SC2086  # $ns, $alone, $tty and $keep are several words or none
 set -eu
@@ -12,7 +13,7 @@ say() { printf 'fx: %s\n' "$*" >&2; }
 die() { say "$*"; exit 125; }
 on_signals() { pid=; for s in HUP INT QUIT TERM; do trap "$1 $s" "$s"; done; }
 die_of() { trap - "$1"; kill -s "$1" $$; }
-[ $# -gt 0 ] || { sed -n '2,6s/^# //p' "$here/fx" >&2; exit 2; }
+[ $# -gt 0 ] || { sed -n '2,7s/^# //p' "$here/fx" >&2; exit 2; }
 
 export PYTHONPATH="$here${PYTHONPATH:+:$PYTHONPATH}"
 export XDG_CACHE_HOME="$here/.cache" MPLCONFIGDIR="$here/.cache/matplotlib"
@@ -22,7 +23,8 @@ export OMPI_ALLOW_RUN_AS_ROOT=1 OMPI_ALLOW_RUN_AS_ROOT_CONFIRM=1
 export OMPI_MCA_btl="${OMPI_MCA_btl:-self,sm}"
 export OMPI_MCA_topo="${OMPI_MCA_topo:-basic}"       # open-mpi/ompi#13918: the other one hangs now and then
 case ${1##*/} in mpirun|mpiexec|prterun)             # ranks that wait leave the core to others; one rank waits for none
-    export OMPI_MCA_mpi_yield_when_idle="${OMPI_MCA_mpi_yield_when_idle:-1}" ;;
+    export OMPI_MCA_mpi_yield_when_idle="${OMPI_MCA_mpi_yield_when_idle:-1}"
+    export MPIR_CVAR_CH4_PROGRESS_THROTTLE="${MPIR_CVAR_CH4_PROGRESS_THROTTLE:-1}" ;;      # MPICH
 esac
 export PRTE_MCA_rmaps_default_mapping_policy="${PRTE_MCA_rmaps_default_mapping_policy:-:oversubscribe}"
 
@@ -41,13 +43,27 @@ if [ "$(id -u)" = 0 ]; then ns='--mount'; else ns='--mount --map-root-user --map
 # unshare alone may be let through, and mount not
 namespaces() { unshare $ns sh -c 'mount -t tmpfs fx /tmp && mount --rbind /proc /proc' 2>/dev/null; }
 
-native_python() {    # a Python that imports everything, if there is one
+has_all() {          # a Python that imports everything; PyPI's DOLFINx needs the MPI that dolfinx_solver loads
+    "$1" -c 'import contextlib
+with contextlib.suppress(ModuleNotFoundError): import dolfinx_solver
+import dolfinx, gmsh, matplotlib, scipy, tqdm
+raise SystemExit(tuple(map(int, dolfinx.__version__.split(".")[:2])) < (0, 9))' >/dev/null 2>&1
+}
+
+venv=$here/.venv
+venv_works() {       # asked once for each change of its packages
+    [ -x "$venv/bin/python3" ] || return 1
+    for packages in "$venv"/lib/python3*/site-packages; do
+        [ ! "$venv/has_dolfinx" -nt "$packages" ] || return 0
+    done
+    "$venv/bin/python3" -c 'import contextlib
+with contextlib.suppress(ModuleNotFoundError): import dolfinx_solver
+import dolfinx' >/dev/null 2>&1 && : >"$venv/has_dolfinx"
+}
+
+native_python() {
     for p in python3 /usr/bin/python3; do
-        p=$(command -v "$p" 2>/dev/null) || continue
-        "$p" -c 'import dolfinx, gmsh, matplotlib, scipy, tqdm
-raise SystemExit(tuple(map(int, dolfinx.__version__.split(".")[:2])) < (0, 9))' >/dev/null 2>&1 || continue
-        dirname -- "$p"
-        return 0
+        p=$(command -v "$p" 2>/dev/null) && has_all "$p" && dirname -- "$p" && return 0
     done
     return 1
 }
@@ -264,21 +280,33 @@ pass() {
     kill -s "$1" -- "-$pid" 2>/dev/null || kill -s "$1" "$pid" 2>/dev/null || :
 }
 
-case $way in ''|native|docker|podman|root|copy) ;; *) die "FX=$way: use native, docker, podman, root or copy" ;; esac
+case $way in
+    ''|venv|native|docker|podman|root|copy) ;;
+    *) die "FX=$way: use venv, native, docker, podman, root or copy" ;;
+esac
 if [ -z "$way" ]; then
-    if [ -d "$root" ]; then way=root
+    if [ -z "${FX_SUITE:-}" ] && venv_works; then way=venv
+    elif [ -d "$root" ]; then way=root
     elif [ -z "${FX_SUITE:-}" ] && bin=$(native_python); then way=native
     elif way=$(engine) && image "$way"; then :
     else way=root; fi
 fi
 case $way in
+    venv)
+        venv_works || die "there is no .venv in $here that imports dolfinx: python3 -m venv .venv, then" \
+            ".venv/bin/pip install '.[solver]'"
+        say "runs in the virtual environment $venv"
+        PATH=$venv/bin:$PATH
+        exec "$@" ;;
     native)
         bin=${bin:-$(native_python)} || die "no Python here imports dolfinx >= 0.9, gmsh, matplotlib, scipy and tqdm"
+        say "runs with this machine's Python, $bin/python3"
         PATH=$bin:$PATH
         exec "$@" ;;
     docker|podman)
         engine "$way" >/dev/null || die "$way does not answer"
         image "$way" || exit 125
+        say "runs in a container of $way"
         tty=; user="$(id -u):$(id -g)"
         [ -t 0 ] && [ -t 1 ] && tty=-t
         [ "$way" = podman ] && [ "$(id -u)" != 0 ] && keep=--userns=keep-id || keep=
@@ -304,4 +332,5 @@ if [ ! -d "$root" ]; then      # under a lock, beside its place, then renamed: n
 fi
 # this machine's libraries and the user's own Python packages are not for the Python in there
 set -- -u LD_LIBRARY_PATH -u LD_PRELOAD -u PYTHONHOME PYTHONNOUSERSITE=1 FX_INSIDE=1 PATH="$clean_path" "$@"
+say "runs in the Debian root $root"
 if [ "$way" = copy ]; then run_copied "$@"; else run_mounted "$@"; fi

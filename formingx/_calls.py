@@ -210,9 +210,9 @@ def _matches(value: Any, kind: Any) -> bool:
 
 
 def _alternatives(kinds: Sequence[Any]) -> list[Any]:
-    """Return the types `kinds` of a union, in which `ArrayLike`, a union itself, becomes one entry."""
+    """Return the types `kinds` of a union, in which `ArrayLike`, before NumPy 2.5 a union itself, becomes one entry."""
     array = set(typing.get_args(ArrayLike))
-    return [ArrayLike, *(k for k in kinds if k not in array)] if array <= set(kinds) else list(kinds)
+    return [ArrayLike, *(k for k in kinds if k not in array)] if array and array <= set(kinds) else list(kinds)
 
 
 def _is_numeric(value: Any) -> bool:

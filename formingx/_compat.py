@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -104,6 +105,22 @@ def _compiled_by_jit(request: Callable[[], Any]) -> Any:
         jit.ffcx_jit = compiler
 
 
+_UNCOLLECTED = 20
+"""Meshes and problems made between two collections of garbage; each may hold 26 communicators of the 2046 of MPICH."""
+_made: list[None] = []
+
+
+def collect_communicators() -> None:
+    """Free, now and then, the communicators of meshes and problems that are no longer used; collective.
+
+    Each new mesh and problem calls it. Objects that refer to each other are freed by a collection of garbage alone.
+    """
+    _made.append(None)
+    if len(_made) >= _UNCOLLECTED:
+        _made.clear()
+        gc.collect()
+
+
 def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges: Any, edge_tags: Any) -> tuple:
     """Return a distributed mesh of triangles with its tags; collective.
 
@@ -123,6 +140,7 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
     import basix.ufl
     from dolfinx import graph, mesh
     from dolfinx.io import distribute_entity_data
+    collect_communicators()
     element = basix.ufl.element("Lagrange", "triangle", 1 if cells.shape[1] == 3 else 2,
                                 shape=(points.shape[1],))
     domain = mesh.create_mesh(comm, cells=cells, x=points, e=ufl.Mesh(element))
@@ -180,6 +198,15 @@ def cell_nodes(mesh: Any) -> Any:
     """Return the nodes of the cells of a DOLFINx mesh, rows of `mesh.geometry.x`, shape (cells, nodes of a cell)."""
     geometry = mesh.geometry
     return geometry.dofmaps[0] if hasattr(geometry, "dofmaps") else geometry.dofmap
+
+
+def collapsed(space: Any) -> tuple[Any, np.ndarray]:
+    """Return the space of a part of a DOLFINx space, and the numbers of its unknowns in the whole space, shape (n,).
+
+    DOLFINx 0.11 puts the numbers in a list, as one array for each type of cells.
+    """
+    own, numbers = space.collapse()
+    return own, np.asarray(numbers).ravel()
 
 
 def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:

@@ -11,6 +11,8 @@ import contextlib
 import ctypes
 import functools
 import hashlib
+import importlib.util
+import inspect
 import os
 import re
 import shlex
@@ -34,6 +36,8 @@ from ffcx import naming
 from ffcx.codegeneration import get_include_path
 from ffcx.codegeneration import jit as ffcx_jit
 
+from .errors import InputError
+
 _FFI = cffi.FFI()
 _DOUBLES, _LONGS = _FFI.typeof("double[]"), _FFI.typeof("long[]")
 NULL = _FFI.NULL
@@ -43,12 +47,12 @@ NULL = _FFI.NULL
 def supported(jit_options: dict[str, Any]) -> bool:
     """Return True if this module can compile forms; otherwise DOLFINx compiles them.
 
-    FFCx must be of version 0.9, and a POSIX system must have a C compiler.
+    FFCx must be of version 0.9, 0.10 or 0.11, and a POSIX system must have a C compiler.
 
     Args:
         jit_options: options of `dolfinx.jit`; `cffi_debug` and `cffi_verbose` must be off.
     """
-    return (ffcx.__version__.startswith("0.9.") and os.name == "posix" and _compiler() is not None
+    return (ffcx.__version__.startswith(("0.9.", "0.10.", "0.11.")) and os.name == "posix" and _compiler() is not None
             and not (jit_options["cffi_debug"] or jit_options["cffi_verbose"]))
 
 
@@ -166,8 +170,7 @@ def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], for
         jit_options: options of DOLFINx for the C compiler.
         form_options: options of FFCx.
     """
-    code = "\n".join(ffcx.compiler.compile_ufl_objects([item], prefix=name, options=form_options)[1]
-                     for name, item in items.items())
+    code = "\n".join(_c_code(item, name, form_options) for name, item in items.items())
     files = [folder / f"{name}.so" for name in items]
     made, other = (folder / f"unfinished_{os.urandom(8).hex()}.so" for _ in range(2))
     try:
@@ -184,6 +187,20 @@ def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], for
         other.unlink(missing_ok=True)
 
 
+def _c_code(item: Any, name: str, form_options: dict[str, Any]) -> str:
+    """Return the C source that FFCx writes for a form or an expression.
+
+    Args:
+        item: UFL form, or (UFL expression, points).
+        name: name of its library, which begins the names of C functions.
+        form_options: options of FFCx.
+    """
+    write = ffcx.compiler.compile_ufl_objects
+    if "namespace" in inspect.signature(write).parameters:                      # FFCx >= 0.11: (sources, suffixes)
+        return write([item], namespace=name, options=form_options)[0][1]
+    return write([item], prefix=name, options=form_options)[1]                 # (header, source)
+
+
 def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
     """Return the path of a shared library of C functions; compile it if the cache does not contain it.
 
@@ -193,10 +210,15 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
         flags: options of the compiler.
 
     Raises:
-        RuntimeError: there is no compiler, or it failed.
+        InputError: there is no compiler.
+        RuntimeError: the compiler failed.
     """
-    command = [*(_compiler() or ("cc",)), *flags, "-shared", "-fPIC", "-x", "c", "-", "-lm"]
-    digest = hashlib.sha1(f"{code}{command}{_compiler_id() if _compiler() else ''}".encode()).hexdigest()
+    compiler = _compiler()
+    if compiler is None:
+        raise InputError("formingx compiles its equations, and there is no C compiler: install Debian's packages gcc"
+                         " and libc6-dev, or PyPI's by \"pip install 'formingx[compiler]'\"; CC=COMMAND names another")
+    command = [*compiler, *flags, "-shared", "-fPIC", "-x", "c", "-", "-lm"]
+    digest = hashlib.sha1(f"{code}{command}{_compiler_id()}".encode()).hexdigest()
     file = Path(jit.get_options()["cache_dir"]) / "formingx" / f"{name}_{digest}.so"
     if not file.exists():
         file = _writable(file.parent) / file.name
@@ -271,6 +293,9 @@ def _compiler() -> tuple[str, ...] | None:
         words = shlex.split(command or "")
         if words and shutil.which(words[0]):
             return tuple(words)
+    package = importlib.util.find_spec("ziglang")      # from PyPI: clang with the headers and libraries of C
+    if package is not None and package.origin:
+        return str(Path(package.origin).with_name("zig")), "cc", "-mcpu=baseline"    # a shared cache
     return None
 
 

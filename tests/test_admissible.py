@@ -8,6 +8,7 @@ from conftest import run_json, treloar
 from dolfinx import fem
 
 import formingx as fx
+from formingx import _compat
 from formingx.forms import elements
 from formingx.forms.admissible import Admissible
 from formingx.problem.problem import Problem
@@ -28,7 +29,7 @@ def displaced(problem, u):
     smooth.interpolate(lambda X: np.array(u(X[:2])) / forms.length)
     V, dofs = forms.space.sub(0).collapse()
     same = fem.Function(V)
-    same.interpolate(fem.Expression(smooth, V.element.interpolation_points()))
+    same.interpolate(fem.Expression(smooth, _compat.interpolation_points(V)))
     forms.w.x.array[dofs] = same.x.array
     return Admissible(forms)
 
@@ -90,7 +91,7 @@ def test_negative_determinant_between_quadrature_points_is_found():
     forms = problem.forms
     dofs = Admissible(forms).dofs[1]
     nodes = forms.space.sub(0).sub(1).collapse()[0].tabulate_dof_coordinates()[:, :2]
-    collapsed = forms.space.sub(0).sub(1).collapse()[1]
+    collapsed = _compat.collapsed(forms.space.sub(0).sub(1))[1]
     edge = collapsed[np.argmin(np.hypot(nodes[:, 0] - 10, nodes[:, 1] - 0.5))]          # on the rim, along Z
     assert edge in dofs
     for share, good in ((0.2, True), (0.33, False)):
@@ -133,6 +134,7 @@ RANKS = """
 import json
 import numpy as np
 import formingx as fx
+from formingx import _compat
 from formingx.forms import elements
 from formingx.forms.admissible import Admissible
 from formingx.problem.problem import Problem

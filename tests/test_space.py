@@ -17,6 +17,7 @@ from formingx.extensions.space.part import _positive_share
 from formingx.io.stl import write_stl
 from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
+from formingx.results.show import views
 from formingx.solve.arc_length import Curve
 from formingx.solve.newton import Failure
 
@@ -645,6 +646,7 @@ def test_report_warns_of_compression_without_relaxed_energy(tmp_path, monkeypatc
     wall = path.wall()
     monkeypatch.setattr(path, "wall", lambda state=None: replace(wall, deformed_points=0.9 * wall.reference_points))
     monkeypatch.setattr(shutil, "which", lambda program: None)
+    monkeypatch.setattr(views, "_window_without_screen", lambda: None)
     monkeypatch.delenv("DISPLAY", raising=False)
     text = path.report(tmp_path / "report.html", density=1.0, units=fx.Units("mm", "MPa")).read_text()
     assert ("<b>serious</b>: 100 % of the sheet is in compression" in text) == (wrinkles is None)

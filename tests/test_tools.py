@@ -336,6 +336,6 @@ def test_no_compiler(tmp_path, monkeypatch):
             compiled()
     monkeypatch.setattr(_jit, "_compiler", lambda: None)
     monkeypatch.setenv("PATH", str(tmp_path))
-    with pytest.raises(RuntimeError, match="the C compiler cannot be run"):
+    with pytest.raises(fx.InputError, match="there is no C compiler: install"):
         compiled()
     assert [file for file in tmp_path.rglob("*") if file.is_file()] == []

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 import ufl
 
+from .. import _compat
 from ..mesh.nodes import dof_positions
 
 
@@ -154,7 +155,7 @@ class Sag(Quantity):
         self.size = self._scale = forms.length
         self._earlier: np.ndarray | float = 0.0               # u_z of the nodes before this mesh was made, over length
         if (state_transfer := forms.scene.state_transfer) is not None:
-            space, numbers = forms.space.sub(0).sub(forms.scene.kinematics.components - 1).collapse()
+            space, numbers = _compat.collapsed(forms.space.sub(0).sub(forms.scene.kinematics.components - 1))
             order = np.argsort(numbers)
             nodes_at = dof_positions(space)[order[np.searchsorted(numbers, self._dofs, sorter=order)]]
             self._earlier = (nodes_at - state_transfer.original_positions(nodes_at))[:, -1] / forms.length

@@ -4,10 +4,30 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
+from ..errors import InputError
+
 _DEFAULTS = {"General.Terminal": 0, "Mesh.Algorithm": 6, "Mesh.ElementOrder": 1, "Mesh.RecombineAll": 0,
              "Mesh.MeshSizeFactor": 1, "Mesh.MeshSizeMin": 0, "Mesh.MeshSizeMax": 1e22, "Mesh.MeshSizeFromPoints": 0,
              "Mesh.MeshSizeFromCurvature": 0, "Mesh.MeshSizeExtendFromBoundary": 1}
 """Default options of gmsh, without its output and without mesh sizes at points; a script may have set others."""
+
+_LIBRARIES = "libglu1-mesa, libgl1, libgomp1, libxcursor1, libxft2 and libxinerama1"
+"""Packages of Debian with the libraries that gmsh from PyPI loads."""
+
+
+def imported() -> Any:
+    """Return the module gmsh.
+
+    Raises:
+        InputError: it is not there, or a library of the system is missing.
+    """
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:
+        raise InputError(f"meshes of free shape and STEP files need gmsh, which cannot be imported: {error}: install it"
+                         f" by \"pip install 'formingx[cad]'\"; its libraries are in Debian's packages {_LIBRARIES}"
+                         ) from None
+    return gmsh
 
 
 @contextmanager
@@ -21,7 +41,7 @@ def model(name: str, options: Mapping[str, float] | None = None) -> Iterator[Any
     Yields:
         The module gmsh.
     """
-    import gmsh
+    gmsh = imported()
     own_session = not gmsh.isInitialized()
     if own_session:
         gmsh.initialize(interruptible=False)

@@ -15,6 +15,7 @@ from dolfinx import la
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from .. import _compat
 from ..contact.face import FaceContact
 from ..contact.resultants import penetration
 from ..contact.step_limit import StepLimit
@@ -57,6 +58,7 @@ class Problem(Stages, Units):
     """
 
     def __init__(self, scene: Scene):
+        _compat.collect_communicators()
         self.scene, self.forms = scene, formulate(scene)
         self.comm, forms = self.forms.comm, self.forms
         forms.compile_ahead(*forms.path_forms())

@@ -27,7 +27,12 @@ def main(file: str, kind: str, seconds: int) -> None:
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     out = os.fdopen(os.dup(1), "w", buffering=1)
     os.dup2(2, 1)                                           # hides the output of the libraries
-    import gmsh
+    try:
+        import gmsh
+    except (ImportError, OSError) as error:
+        out.write(json.dumps({"error": f"it needs gmsh, which cannot be imported: {error}: install it by \"pip install"
+                                       " 'formingx[cad]'\", and the libraries of the system that it names"}) + "\n")
+        return
     gmsh.initialize([], readConfigFiles=False, interruptible=False)
     gmsh.option.setNumber("General.Terminal", 0)
     model = gmsh.model

@@ -205,6 +205,7 @@ class Design:
                 break
             predicted = best.wall + share * (best.derivative("wall")[1] @ step)
             gained = 1 - objective.cost(new) / objective.cost(best)
+            best.forget_perturbed_runs()
             best = new
             if max(gained, gained_before) < SETTINGS.min_improvement:    # a small improvement may precede a larger one
                 reason = f"the last run was {100 * gained:.1f} % better"
@@ -276,6 +277,7 @@ class Design:
                 new = self._run(np.clip(best.vector + step, low, high))
                 runs.append(new)
                 if cost(new) < cost(best):
+                    best.forget_perturbed_runs()
                     predicted, best, trust_radius = wall + jacobian @ step, new, min(2 * trust_radius, 1.0)
                     continue
             except (InputError, ConvergenceError) as error:

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import _compat
 from ...errors import InputError
 from ...problem.problem import Problem
 from ...solve.newton import Failure, Tolerances
@@ -87,7 +88,7 @@ class PerturbedRun:
     def __init__(self, scene: Any, end: Any, base: Problem, name: str):
         self.name, self.end = name, end
         self.path: Any = None
-        cells, base_cells = (s.mesh.domain.geometry.dofmap for s in (scene, base.scene))
+        cells, base_cells = (_compat.cell_nodes(s.mesh.domain) for s in (scene, base.scene))
         if not np.array_equal(cells, base_cells) or len(scene.items) != len(base.scene.items):
             raise InputError(f"Design: {name} changes the elements of the mesh, or the number of loads, supports or"
                              f" contacts: there are derivatives only by what moves nodes or changes numbers")

@@ -168,6 +168,10 @@ class DesignRun:
                 return perturbed_runs
         raise InputError(f"Design: this run has no derivative: {reason}")
 
+    def forget_perturbed_runs(self) -> None:
+        """Free the perturbed runs with their communicators; `derivative` computes them again if it is called again."""
+        vars(self).pop("_perturbed_runs", None)
+
     def _perturbed_run(self, k: int, step: float) -> PerturbedRun:
         """Return a new perturbed run without a state, whose parameter number k is larger by `step` than in this run."""
         moved, name = self.vector.copy(), self.parameters.names[k]

@@ -5,6 +5,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import _compat
 from ...findings import Finding, register
 from ...mesh.nodes import nearest
 from ...physics.supports import Symmetry
@@ -86,7 +87,7 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
     if scene.kinematics.components != 3 or not tools:
         return
     mesh = scene.mesh
-    corners = mesh.domain.geometry.x[mesh.domain.geometry.dofmap]
+    corners = mesh.domain.geometry.x[_compat.cell_nodes(mesh.domain)]
     edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
     length = float(np.median(gathered(mesh.comm, edges.ravel())))
     for contact in tools:

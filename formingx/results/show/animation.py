@@ -34,7 +34,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
         OSError: the file cannot be written.
     """
     file = files.named("animate", file, ".gif", ".mp4")
-    if file.suffix.lower() == ".mp4" and shutil.which("ffmpeg") is None:
+    if file.suffix.lower() == ".mp4" and _ffmpeg() is None:
         raise InputError(f"animate: file {str(file)!r}: an MP4 needs the program ffmpeg, which is not there; a .gif"
                          f" needs nothing")
     frames, seconds = count("animate: frames", frames), positive("animate: seconds", seconds)
@@ -55,6 +55,20 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
         save = _save_gif if file.suffix.lower() == ".gif" else _save_mp4
         files.replace(file, lambda stream: save(pictures, seconds, stream), "wb")
     files.on_root(path.problem.comm, draw)
+
+
+def _ffmpeg() -> str | None:
+    """Return the command ffmpeg of the system, or the program in PyPI's package `imageio-ffmpeg`; None without both."""
+    if (found := shutil.which("ffmpeg")) is not None:
+        return found
+    try:
+        import imageio_ffmpeg
+    except ImportError:
+        return None
+    try:
+        return str(imageio_ffmpeg.get_ffmpeg_exe())
+    except RuntimeError:                                     # a package without the program
+        return None
 
 
 def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
@@ -198,9 +212,9 @@ def _save_mp4(pictures: list[Any], seconds: float, stream: Any) -> None:
     width, height = (2 * (n // 2) for n in pictures[0].size)              # H.264 wants even numbers
     rate = len(pictures) / seconds
     stream.close()                                           # ffmpeg writes the file by its name
-    command = ["ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{width}x{height}",
-               "-r", f"{rate:.6f}", "-i", "-", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4",
-               stream.name]
+    command = [_ffmpeg() or "ffmpeg", "-y", "-loglevel", "error", "-f", "rawvideo", "-pix_fmt", "rgb24",
+               "-s", f"{width}x{height}", "-r", f"{rate:.6f}", "-i", "-", "-pix_fmt", "yuv420p",
+               "-movflags", "+faststart", "-f", "mp4", stream.name]
     frames = [picture.crop((0, 0, width, height)).tobytes() for picture in pictures]
     frames += frames[-1:] * max(int(rate), 1)
     done = subprocess.run(command, input=b"".join(frames), capture_output=True, check=False)

@@ -1,10 +1,12 @@
 """Three-dimensional pictures drawn with pyvista, without a screen."""
 
 import contextlib
+import functools
 import io
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from typing import Any
 
@@ -186,16 +188,26 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 def screen() -> Iterator[None]:
     """Provide a display within a `with` block: the present one, or a virtual one (Xvfb) that ends with the block.
 
-    Debian's VTK, with which pyvista draws, aborts without a display.
+    Debian's VTK, with which pyvista draws, aborts without a display. VTK from version 9.5 on, as PyPI has it, needs
+    none if the system has EGL or OSMesa.
 
     Raises:
-        InputError: there is neither a screen nor Xvfb.
+        InputError: there is neither a screen nor Xvfb, and VTK needs one.
     """
     if os.environ.get("DISPLAY"):
         yield
         return
     if shutil.which("Xvfb") is None:
-        raise InputError("a 3-D view needs a screen (DISPLAY) or the program Xvfb: install the package xvfb")
+        window = _window_without_screen()
+        if window is None:
+            raise InputError("a 3-D view needs a screen (DISPLAY), the program Xvfb, or EGL with VTK >= 9.5: install"
+                             " the package xvfb or libegl1")
+        os.environ[_WINDOW] = window
+        try:
+            yield
+        finally:
+            del os.environ[_WINDOW]
+        return
     read, write = os.pipe()
     server = subprocess.Popen(["Xvfb", "-displayfd", str(write), "-screen", "0", "1600x1200x24", "-nolisten", "tcp"],
                               pass_fds=(write,), stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
@@ -211,3 +223,22 @@ def screen() -> Iterator[None]:
         os.environ.pop("DISPLAY", None)
         server.terminate()
         server.wait()
+
+
+_WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
+"""Environment variable by which VTK from version 9.5 on chooses its kind of window."""
+
+
+@functools.cache
+def _window_without_screen() -> str | None:
+    """Return the kind of window that VTK draws here without a display, or None.
+
+    Another process tries, because VTK crashes where it cannot draw.
+    """
+    script = ("import vtkmodules.vtkRenderingOpenGL2; from vtkmodules.vtkRenderingCore import vtkRenderWindow;"
+              "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8); w.Render()")
+    for window in (os.environ.get(_WINDOW, "vtkEGLRenderWindow"), "vtkOSOpenGLRenderWindow"):
+        if not subprocess.run([sys.executable, "-c", script], capture_output=True,
+                              env=os.environ | {_WINDOW: window}).returncode:
+            return window
+    return None
