@@ -9,7 +9,7 @@ from .errors import InputError, check_name, finite
 LENGTHS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254, "ft": 0.3048}
 STRESSES = {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "GPa": 1e9, "N/mm2": 1e6, "bar": 1e5, "atm": 101325.0,
             "psi": 6894.757293168, "kg/cm2": 98066.5, "kgf/cm2": 98066.5}
-_FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "kgf": 9.80665, "lbf": 4.4482216152605}
+FORCES = {"N": 1.0, "kN": 1e3, "MN": 1e6, "mN": 1e-3, "kgf": 9.80665, "lbf": 4.4482216152605}
 _ENERGIES = {"J": 1.0, "kJ": 1e3, "MJ": 1e6, "mJ": 1e-3, "uJ": 1e-6}
 _KINDS = (("pressure", "stress"), ("stress", "stress"), ("force", "force"), ("energy", "energy"), ("work", "energy"),
           ("power", "power"), ("volume", "volume"), ("area", "area"), ("travel", "length"),
@@ -69,7 +69,7 @@ class Units:
     @property
     def force(self) -> str:
         """Unit of forces, stress length^2: "N" for mm and MPa, "lbf" for in and psi; "" if a unit is not given."""
-        return self._whole(self._derived(_FORCES, 2))
+        return self._whole(self._derived(FORCES, 2))
 
     @property
     def tension(self) -> str:

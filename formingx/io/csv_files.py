@@ -1,8 +1,10 @@
 """CSV tables of other programs, with named columns and units."""
 
 import csv
+import io
 import os
 import re
+from collections import Counter
 from collections.abc import Mapping
 from typing import Any, NamedTuple
 
@@ -124,8 +126,9 @@ def read(file: Any) -> CsvTable:
 def records(file: Any) -> list[tuple[int, list[str]]]:
     """Return the cells of a CSV file as text; decimal commas are replaced by points.
 
-    Cells are separated by semicolons or tabs if the first line contains one outside quotes, otherwise by commas. Empty
-    lines, and lines that begin with #, are skipped. Between commas, a number with a decimal comma must be in quotes.
+    Cells are separated by semicolons or tabs if the first line, or more than half of the lines, contain one outside
+    quotes, otherwise by commas. Empty lines, and lines that begin with #, are skipped. Between commas, a number with a
+    decimal comma must be in quotes. The text is UTF-8, UTF-16, or else Windows-1252.
 
     Args:
         file: name of the file.
@@ -138,14 +141,16 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
     """
     name = os.fspath(file)
     try:
-        with open(name, newline="", encoding="utf-8-sig") as stream:
-            lines = _without_remarks(list(stream))
+        with open(name, "rb") as stream:
+            text = _decoded(stream.read())
+        lines = _without_remarks(list(io.StringIO(text, newline="")))
     except FileNotFoundError:
         raise InputError(f"table {name!r} is not there") from None
     except (OSError, UnicodeDecodeError) as error:
         raise InputError(f"table {name!r} cannot be read: {error}") from None
-    first = re.sub('"[^"]*"', "", lines[0][1]) if lines else ""
-    delimiter = next((mark for mark in ";\t" if mark in first), ",")
+    bare = [re.sub('"[^"]*"', "", line) for _, line in lines]
+    delimiter = next((mark for mark in ";\t" if bare and (mark in bare[0]
+                                                          or 2 * sum(mark in line for line in bare) > len(bare))), ",")
     found, reader = [], csv.reader((line for _, line in lines), delimiter=delimiter, strict=True)
     try:
         for row in reader:
@@ -153,15 +158,33 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
     except csv.Error as error:
         line_number = lines[min(reader.line_num, len(lines)) - 1][0] if lines else 0
         raise InputError(f"table {name!r}, line {line_number}: {error}") from None
-    commas = [(n, cell) for n, row in found for cell in row if _DECIMAL_COMMA.fullmatch(cell)]
+    width = Counter(len(row) for _, row in found).most_common(1)[0][0] if found else 0
+    table = [(n, row) for n, row in found if len(row) == width]           # a title may have numbers of its own
+    commas = [(n, cell) for n, row in table for cell in row if _DECIMAL_COMMA.fullmatch(cell)]
     if not commas:
         return found
-    points = [(n, cell) for n, row in found for cell in row if "." in cell and is_number(cell)]
+    points = [(n, cell) for n, row in table for cell in row if "." in cell and is_number(cell)]
     if points:
         raise InputError(f"table {name!r}: {commas[0][1]!r} in line {commas[0][0]} has a decimal comma,"
                          f" {points[0][1]!r} in line {points[0][0]} a point: all numbers must have the same")
     return [(n, [cell.replace(",", ".") if _DECIMAL_COMMA.fullmatch(cell) else cell for cell in row])
             for n, row in found]
+
+
+def _decoded(content: bytes) -> str:
+    """Return the bytes of a file as text: UTF-16 with its mark or with many zero bytes, UTF-8, or else Windows-1252.
+
+    Raises:
+        UnicodeDecodeError: the bytes are none of these.
+    """
+    if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return content.decode("utf-16")
+    if content[1:400:2].count(0) > len(content[1:400:2]) / 2:
+        return content.decode("utf-16-le")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return content.decode("cp1252")
 
 
 def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:

@@ -9,15 +9,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, file_path
+from ...errors import InputError, check_name, file_path, finite
 from ...figures import Axes
 from ...findings import percent
+from ...materials.constants import OfTemperature
 from ...materials.material import Material
 from ...materials.relaxing import GeneralisedMaxwell
 from ...values.intervals import t_intervals
+from ...values.table import table
+from ...values.temperature import ABSOLUTE_ZERO
 from .fit_in_time import TimedTest, fit_timed_tests
 from .fit_plot import draw_fit
-from .measured import read_tests
+from .fit_shift import fit_shift
+from .measured import MeasuredTest, read_tests
 from .points import Points
 from .tested import MeasuredRange
 from .uncertainty import Uncertainty, uncertainty
@@ -51,6 +55,10 @@ class Fit(NamedTuple):
         covariance: covariance of the constants, shape (p, p), in the order of `constants`.
         points: number of measured stresses.
         data: the tests, as they were given to `fit`.
+        conversions: what was done to the columns of files, such as "stretch = 1 + strain/100".
+        shift: shift of the relaxation times of tests at several temperatures, or None.
+        shares: {constant: {test: part of the information on the constant that the test carries, 0 to 1}}, the sum of
+            the squared derivatives of its stresses by the constant over that of all tests.
     """
 
     material: Material
@@ -63,6 +71,9 @@ class Fit(NamedTuple):
     covariance: np.ndarray
     points: int
     data: Any
+    conversions: tuple[str, ...] = ()
+    shift: Any = None
+    shares: dict[str, Any] = {}
 
     def intervals(self, confidence: float = 0.95) -> dict[str, tuple[float, float]]:
         """Return the confidence interval of each constant by Student's t distribution.
@@ -92,20 +103,30 @@ class Fit(NamedTuple):
         Returns:
             The matplotlib axes.
         """
-        return draw_fit(self.material, self.data, axes, unit, unit_of_time)
+        if isinstance(self.data, dict) and any(not isinstance(name, str) for name in self.data):
+            raise InputError("Fit.plot: the fit has a card for each temperature: plot a fit of tests at one of them")
+        material: Any = self.material
+        if self.shift is not None:                          # the tests have their times at the reference temperature
+            material = type(material)(material.equilibrium, [(self.constants[f"mu_{k}"], self.constants[f"tau_{k}"])
+                                                             for k in range(1, len(material.branches) + 1)])
+        return draw_fit(material, self.data, axes, unit, unit_of_time)
 
     def __str__(self) -> str:
         parts = ", ".join(f"{mode} {value:.4g} ({percent(self.deviations[mode])})"
                           for mode, value in self.rms.items())
         undetermined = f"; the data do not determine {', '.join(self.undetermined)}" if self.undetermined else ""
-        return f"{self.material}: rms {self.rms_total:.4g} ({parts}){undetermined}"
+        lines = [f"{self.material}: rms {self.rms_total:.4g} ({parts}){undetermined}"]
+        if self.shift is not None:
+            lines.append(f"shift {self.shift!r}")
+        return "\n".join([*lines, *self.conversions])
 
     def __repr__(self) -> str:
         return str(self)
 
 
 def fit(material: type[Material] | Material, data: Any, terms: int | None = None, *, relative: bool = True,
-        weights: Any = None, within: tuple[float, float] | None = None) -> Fit:
+        weights: Any = None, within: tuple[float, float] | None = None, test: str | None = None, specimen: Any = None,
+        temperature: Any = None, reference: float | None = None, shift: str = "WLF", unit: str = "C") -> Fit:
     """Fit the constants of a material to tests by least squares of the nominal stress.
 
     The fit starts from several first guesses, and the best result counts. All constants are admissible, and no stretch
@@ -122,10 +143,12 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
             and "equibiaxial". For "biaxial": (stretches 1, stretches 2, nominal stresses 1, nominal stresses 2); nan
             for a stress that was not measured. The constants get the unit of the stress, force over reference area.
             For a relaxing material: a list of `TimedTest`.
-            Or the name of a CSV file with the columns test, stretch, stress (nominal), and for a relaxing material
-            time. The columns may be in any order if the first line names them, else in this order. Units in brackets
-            are checked, not converted. A test ends where its name changes or the time decreases. A stress that was not
-            measured is left empty in a test in time.
+            Or the name of a CSV file, or a list of such, with the columns test, stretch, stress (nominal), and for a
+            relaxing material time. The columns may be in any order if a line names them, else in this order. In place
+            of the stretch there may be a strain, a true strain (also in %) or a displacement, in place of the stress a
+            true stress or a force; `Fit.conversions` says what was done. Other units in brackets are checked, not
+            converted. A test ends where its name or temperature changes or the time decreases. A stress that was not
+            measured is left empty in a test in time. A column of numbers that is not used is refused.
         terms: number of terms if `material` is the class `Ogden`, default 3. For a relaxing class it is the number of
             branches, default as many as the tests determine; the equilibrium is then neo-Hookean.
         relative: True: each misfit is divided by the measured stress, or by 2 % of the largest stress of the test if
@@ -134,6 +157,15 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
             test. Default: 1.
         within: lowest and highest stretch of the points that count, or None for all. In biaxial tests both stretches
             must lie in the range.
+        test: name of the test in files without a column of it, such as "uniaxial".
+        specimen: {"length": gauge length, "width": ..., "thickness": ...}, or "area", for files with displacement and
+            force.
+        temperature: temperature of the tests, one for each test or file, or one for all; the files may have a column of
+            it. With several, the constants of an elastic material become tables over the temperature. A relaxing
+            material gets a shift of its relaxation times, fitted together with its constants.
+        reference: reference temperature of the shift; default the temperature of the first test.
+        shift: "WLF", "Arrhenius" or "table" (one factor for each temperature).
+        unit: unit of the temperatures, "C" or "K".
 
     Returns:
         Fitted material, with misfits and uncertainty of the constants.
@@ -148,33 +180,169 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
     >>> {name: round(value, 6) for name, value in found.material.parameters.items()}
     {'c10': 0.2, 'c01': 0.05}
     """
+    check_name("fit: unit", unit, ABSOLUTE_ZERO)
+    files = _files(data, test, specimen)
+    given = _temperatures(data, files, temperature)
+    conversions = tuple(dict.fromkeys(f"{entry.source}: {done}" for entry in files for done in entry.conversions))
+    several = given is not None and len(set(given)) > 1
+    if reference is not None and not several:
+        raise InputError(f"fit: reference = {reference!r}: is for tests at several temperatures: give temperature=..."
+                         f" or a column of it")
     for kind, fitted in IN_TIME:
         if isinstance(material, kind) or isinstance(material, type) and issubclass(material, kind):
-            return _fit_timed(fitted, material, data, terms, relative, weights, within)
-    points = Points(_tests(data) if isinstance(data, str | os.PathLike) else data, relative, weights, within)
-    best, found = _fit_elastic(material, points, terms)
+            tests = _in_time(files) if files else data
+            if several:
+                assert given is not None
+                found = _fit_shifted(fitted, material, tests, given, shift, reference, unit, terms, relative, weights,
+                                     within)
+            else:
+                found = _fit_timed(fitted, material, tests, terms, relative, weights, within)
+            return found._replace(conversions=conversions)
+    if several and not files:
+        raise InputError("fit: temperature: elastic tests at several temperatures must be files, or one fit each")
+    if several:
+        assert given is not None
+        return _fit_by_temperature(material, files, given, terms, relative, weights, within, conversions)
+    points = Points(_elastic(files) if files else data, relative, weights, within)
+    best, sure = _fit_elastic(material, points, terms)
     misfit = points.stress(best.response, best.parameters.values()) - points.measured
-    return _result(best, dict(best.parameters), points.parts, misfit, points.measured, found,
-                   MeasuredRange.from_stretches(points.stretches_of, found.undetermined), points.data)
+    return _result(best, dict(best.parameters), points.parts, misfit, points.measured, sure,
+                   MeasuredRange.from_stretches(points.stretches_of, sure.undetermined), points.data
+                   )._replace(conversions=conversions)
 
 
-def _fit_timed(fitted: Callable, material: Any, data: Any, terms: int | None, relative: bool, weights: Any,
+def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest]:
+    """Return the tests of the files among the data; empty if the data are no files.
+
+    Raises:
+        InputError: `test` or `specimen` without files.
+    """
+    names = [data] if isinstance(data, str | os.PathLike) else data
+    if not (isinstance(names, list | tuple) and names and all(isinstance(name, str | os.PathLike) for name in names)):
+        if test is not None or specimen is not None:
+            raise InputError("fit: test and specimen are for data in files")
+        return []
+    return [entry for name in names for entry in read_tests(file_path("fit: data", name), test, specimen)]
+
+
+def _temperatures(data: Any, files: list[MeasuredTest], given: Any) -> list[float] | None:
+    """Return the temperature of each test, or None if it is not known.
+
+    Args:
+        data: argument `data` of `fit`.
+        files: tests of the files among the data.
+        given: argument `temperature` of `fit`.
+
+    Raises:
+        InputError: another number of temperatures than tests or files, or temperatures in the files, too.
+    """
+    columns = [entry.temperature for entry in files]
+    if given is None:
+        if any(T is None for T in columns) and any(T is not None for T in columns):
+            raise InputError("fit: temperature: some of the files have a column of it, others do not")
+        return None if not columns or columns[0] is None else [T for T in columns if T is not None]
+    if any(T is not None for T in columns):
+        raise InputError(f"fit: temperature = {given!r}: the files have a column of it: give only one of them")
+    names = list(dict.fromkeys(entry.source for entry in files))
+    several = given if isinstance(given, list | tuple | np.ndarray) else [given]
+    values = [finite("fit: temperature", T) for T in several]
+    number = len(files) if files else len(data) if isinstance(data, list | tuple) else 1
+    if len(values) == 1:
+        return values * number
+    if files and len(values) == len(names):
+        return [values[names.index(entry.source)] for entry in files]
+    if len(values) != number:
+        raise InputError(f"fit: temperature: {len(values)} for {number} tests: give one for each, or one for all")
+    return values
+
+
+def _fit_shifted(fitted: Callable, material: Any, tests: Any, temperatures: list[float], shift: str,
+                 reference: float | None, unit: str, terms: int | None, relative: bool, weights: Any, within: Any
+                 ) -> Fit:
+    """Fit a relaxing material and its shift to tests at several temperatures (`fit`), and return the result."""
+    reference = temperatures[0] if reference is None else finite("fit: reference", reference)
+    if fitted is not fit_timed_tests:
+        raise InputError("fit: temperature: a damping does not depend on the temperature: fit each temperature, or one")
+    found = fit_shift(fitted, material, list(tests), np.array(temperatures), shift, reference, unit, terms, relative,
+                      numbered_weights(weights, len(tests)), within)
+    result = _timed_result(found.material.at_temperature(reference), found.constants, found.tests, found.uncertainty)
+    found.material.tested = result.material.tested
+    names = {name: f"{name} at {T:g} {unit}" for name, T in zip(result.rms, temperatures)}
+    return result._replace(material=found.material, rms={names[k]: v for k, v in result.rms.items()},
+                           deviations={names[k]: v for k, v in result.deviations.items()}, shift=found.shift)
+
+
+def _fit_by_temperature(material: Any, files: list[MeasuredTest], temperatures: list[float], terms: int | None,
+                        relative: bool, weights: Any, within: Any, conversions: tuple[str, ...]) -> Fit:
+    """Fit an elastic material at each temperature; its constants become tables over the temperature.
+
+    Raises:
+        InputError: a constant cannot depend on the temperature, such as an exponent.
+    """
+    each: dict[float, Fit] = {}
+    for T in sorted(set(temperatures)):
+        points = Points(_elastic([f for f, at in zip(files, temperatures) if at == T]), relative, weights, within)
+        best, sure = _fit_elastic(material, points, terms)
+        misfit = points.stress(best.response, best.parameters.values()) - points.measured
+        each[T] = _result(best, dict(best.parameters), points.parts, misfit, points.measured, sure,
+                          MeasuredRange.from_stretches(points.stretches_of, sure.undetermined), points.data)
+    names = list(next(iter(each.values())).constants)
+    card = copy.copy(next(iter(each.values())).material)
+    if any(name.startswith("alpha") for name in names):
+        raise InputError(f"fit: {type(card).__name__} at several temperatures: an exponent cannot depend on the"
+                         f" temperature; fit each temperature by itself, or another material")
+    vars(card).pop("response", None)
+    tables = {name: table({T: found.constants[name] for T, found in each.items()}) for name in names}
+    card.parameters = {name: OfTemperature(curve) for name, curve in tables.items()}
+    card.tested = MeasuredRange.from_stretches(
+        {mode: np.concatenate([entry.stretch for entry in files if entry.mode == mode])
+         for mode in dict.fromkeys(entry.mode for entry in files)}, ())
+
+    def merged(attribute: str) -> dict[str, Any]:
+        """Return the entries of an attribute of the fits, with their temperatures."""
+        return {f"{name} at {T:g}": value for T, found in each.items() for name, value in getattr(found, attribute
+                                                                                                    ).items()}
+    sizes = [len(found.covariance) for found in each.values()]
+    covariance = np.zeros((sum(sizes), sum(sizes)))
+    for k, found in enumerate(each.values()):
+        part = slice(sum(sizes[:k]), sum(sizes[:k + 1]))
+        covariance[part, part] = found.covariance
+    total = np.sqrt(np.average([found.rms_total**2 for found in each.values()],
+                               weights=[found.points for found in each.values()]))
+    undetermined = tuple(f"{name} at {T:g}" for T, found in each.items() for name in found.undetermined)
+    return Fit(card, merged("constants"), merged("rms"), float(total), merged("deviations"), merged("errors"),
+               undetermined, covariance, sum(found.points for found in each.values()),
+               {T: found.data for T, found in each.items()}, conversions, shares=merged("shares"))
+
+
+def _fit_timed(fitted: Callable, material: Any, tests: Any, terms: int | None, relative: bool, weights: Any,
              within: Any) -> Fit:
     """Fit a relaxing material to tests in time, and return the result.
 
     Args:
         fitted: function that fits the constants of materials of this class.
         material: class, or material with initial constants.
-        data: list of `TimedTest`, or the name of a CSV file.
+        tests: list of `TimedTest`.
         terms: number of branches; None: as many as the tests determine.
         relative: True for misfits over the measured stress, False for misfits in stress.
         weights: weight of each test, or None.
         within: lowest and highest stretch of the points that count, or None.
     """
-    tests = _tests_in_time(data) if isinstance(data, str | os.PathLike) else data
     number = len(tests) if isinstance(tests, list | tuple) else 0
     relaxing, constants, used, found = fitted(material, tests, terms, relative, numbered_weights(weights, number),
                                               within)
+    return _timed_result(relaxing, constants, used, found)
+
+
+def _timed_result(relaxing: Any, constants: dict[str, float], used: list[TimedTest], found: Uncertainty) -> Fit:
+    """Return the `Fit` of a relaxing material.
+
+    Args:
+        relaxing: material with the fitted constants.
+        constants: {constant: value}.
+        used: the checked tests.
+        found: uncertainty of the constants.
+    """
     misfits, measured, parts, n = [], [], {}, 0
     stretches: dict[str, list] = {}
     rates = []
@@ -192,7 +360,7 @@ def _fit_timed(fitted: Callable, material: Any, data: Any, terms: int | None, re
     tested = MeasuredRange.from_stretches(
         {mode: np.concatenate(rows) for mode, rows in stretches.items()}, found.undetermined,
         (float(strain_rates.min()), float(strain_rates.max())) if len(strain_rates) else None)
-    return _result(relaxing, constants, parts, np.concatenate(misfits), np.concatenate(measured), found, tested, tests)
+    return _result(relaxing, constants, parts, np.concatenate(misfits), np.concatenate(measured), found, tested, used)
 
 
 def _result(material: Any, constants: dict[str, float], parts: dict[str, slice], misfit: np.ndarray,
@@ -215,7 +383,17 @@ def _result(material: Any, constants: dict[str, float], parts: dict[str, slice],
                   for name, part in parts.items()}
     rms = {name: _rms(misfit[part]) for name, part in parts.items()}
     return Fit(fitted_material, constants, rms, _rms(misfit), deviations, found.errors, found.undetermined,
-               found.covariance, len(misfit), data)
+               found.covariance, len(misfit), data, shares=_shares(found, parts))
+
+
+def _shares(found: Uncertainty, parts: dict[str, slice]) -> dict[str, dict[str, float]]:
+    """Return {constant: {test: part of the information on the constant that the test carries, 0 to 1}}."""
+    if found.slopes is None:
+        return {}
+    squares = found.slopes**2
+    total = np.maximum(squares.sum(0), 1e-300)
+    return {name: {test: float(squares[part, k].sum() / total[k]) for test, part in parts.items()}
+            for k, name in enumerate(found.errors)}
 
 
 def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Material, Uncertainty]:
@@ -271,32 +449,32 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
     return best, uncertainty(lambda x: points.stress(response, x), best.parameters, measured, points.sizes)
 
 
-def _tests(file: Any) -> dict[str, tuple[np.ndarray, ...]]:
-    """Return {test: (stretches, stresses)} of a CSV file without times.
+def _elastic(files: list[MeasuredTest]) -> dict[str, tuple[np.ndarray, ...]]:
+    """Return {test: (stretches, stresses)} of tests from files without times.
 
     Raises:
-        InputError: the file has a fourth column with the time.
+        InputError: a file has a column with the time.
     """
     found: dict[str, list] = {}
-    for mode, columns in read_tests(file_path("fit: data", file)):
-        if len(columns) != 2:
-            raise InputError(f"fit: data: {file}: has times; a material that does not relax has none: leave the column"
-                             f" out")
-        found.setdefault(mode, []).append(columns)
-    return {mode: tuple(np.hstack(parts)) for mode, parts in found.items()}
+    for entry in files:
+        if entry.times is not None:
+            raise InputError(f"fit: data: {entry.source}: has times; a material that does not relax has none: leave the"
+                             f" column out")
+        found.setdefault(entry.mode, []).append((entry.stretch, entry.stress))
+    return {mode: tuple(np.hstack(column) for column in zip(*parts)) for mode, parts in found.items()}
 
 
-def _tests_in_time(file: Any) -> list[TimedTest]:
-    """Return the tests in time of a CSV file.
+def _in_time(files: list[MeasuredTest]) -> list[TimedTest]:
+    """Return the tests in time from files.
 
     Raises:
-        InputError: the file has no fourth column with the time.
+        InputError: a file has no column with the time.
     """
-    tests = read_tests(file_path("fit: data", file))
-    if any(len(columns) != 3 for _, columns in tests):
-        raise InputError(f"fit: data: {file}: has no times: a material that relaxes needs a fourth column with"
-                         f" the time")
-    return [TimedTest(mode, times, stretches, stress) for mode, (stretches, stress, times) in tests]
+    for entry in files:
+        if entry.times is None:
+            raise InputError(f"fit: data: {entry.source}: has no times: a material that relaxes needs a fourth column"
+                             f" with the time")
+    return [TimedTest(entry.mode, entry.times, entry.stretch, entry.stress) for entry in files]
 
 
 def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]:

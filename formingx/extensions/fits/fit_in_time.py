@@ -235,6 +235,88 @@ class _TimedData:
         return uncertainty(lambda x: self.stresses(material, x), material.parameters, self.stress, self.sizes)
 
 
+class ShiftedTests:
+    """Stresses of a relaxing material in tests at several temperatures.
+
+    A branch with the relaxation time tau at the reference temperature has the time aT tau in a test with the shift aT.
+    The stresses of branches are computed once, over a wide range of times.
+
+    Args:
+        tests: the checked tests.
+        material: class, or material whose equilibrium is scaled in the first search.
+        relative: True for misfits over the measured stress, False for misfits in stress.
+        weights: weight of each test.
+
+    Attributes:
+        stress: measured nominal stresses, shape (n,).
+        sizes: stress by which each misfit is divided, shape (n,).
+    """
+
+    def __init__(self, tests: list[TimedTest], material: Any, relative: bool, weights: list[float]):
+        from scipy.interpolate import CubicSpline
+        given = _initial_material(material) if isinstance(material, type) else material
+        measured = [np.isfinite(t.stress) for t in tests]
+        self.stress = np.concatenate([t.stress[m] for t, m in zip(tests, measured)])
+        self.sizes = divisors([t.stress[m] for t, m in zip(tests, measured)], relative, weights)
+        self._stretches = np.hstack([homogeneous.in_plane_stretches(t.mode, t.stretches[m])
+                                     for t, m in zip(tests, measured)])
+        self._splines = []
+        for test, mask in zip(tests, measured):
+            steps = np.diff(test.times)
+            if not np.any(steps > 0):
+                raise InputError("fit: data: a test lasts no time: its times are all the same")
+            low, high = np.log(steps[steps > 0].min() / 1000), np.log(1000 * np.ptp(test.times))
+            grid = np.linspace(low, high, 2 + int(_TIMES_PER_DECADE / 2 * (high - low) / np.log(10)))
+            unit = type(given).unit_stress(test.mode, np.exp(grid), test.times, test.stretches, test.between, 1e-6)
+            self._splines.append(CubicSpline(grid, unit[mask], axis=1))
+        l1, l2 = self._stretches
+        self._equilibrium = _scaled(given.equilibrium, 1.0, float(np.max(l1**2 + l2**2 + (l1 * l2) ** -2)))
+
+    def branches(self, tau: np.ndarray, factors: np.ndarray) -> np.ndarray:
+        """Return the stresses of j branches of unit modulus at all measured points, shape (n, j).
+
+        Args:
+            tau: relaxation times at the reference temperature, shape (j,).
+            factors: shift of each test.
+        """
+        found = []
+        for spline, a in zip(self._splines, factors):
+            log_tau = np.log(tau) + np.log(a)
+            viscous = np.exp(np.minimum(log_tau - spline.x[0], 0.0))      # a fast branch: stress is tau times rate
+            found.append(viscous * spline(np.clip(log_tau, spline.x[0], spline.x[-1])))
+        return np.concatenate(found)
+
+    def spectrum_misfit(self, factors: np.ndarray) -> float:
+        """Return the squared misfit of the best spectrum with two times per decade and nonnegative moduli.
+
+        Args:
+            factors: shift of each test.
+        """
+        from scipy.optimize import nnls
+        low = min(spline.x[0] - np.log(a) for spline, a in zip(self._splines, factors))
+        high = max(spline.x[-1] - np.log(a) for spline, a in zip(self._splines, factors))
+        tau = np.exp(np.linspace(low, high, 2 + int(2 * (high - low) / np.log(10))))
+        columns = self.branches(tau, factors)
+        if self._equilibrium is not None:
+            values = list(self._equilibrium.parameters.values())
+            columns = np.column_stack([self._equilibrium.response.stress(self._stretches, values)[0], columns])
+        return float(nnls(columns / self.sizes[:, None], self.stress / self.sizes)[1] ** 2)
+
+    def stresses(self, material: GeneralisedMaxwell, constants: Any, factors: np.ndarray) -> np.ndarray:
+        """Return the nominal stresses at all measured points, shape (n,).
+
+        Args:
+            material: the material.
+            constants: its constants at the reference temperature, in the order of `parameters`.
+            factors: shift of each test.
+        """
+        values, n = np.asarray(constants, float), len(material.parameters) - 2 * len(material.branches)
+        rest = 0.0
+        if material.equilibrium is not None:
+            rest = material.equilibrium.response.stress(self._stretches, values[:n])[0]
+        return rest + self.branches(values[n + 1::2], factors) @ values[n::2]
+
+
 def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tuple[GeneralisedMaxwell, float]:
     """Fit the constants of a relaxing material with n branches to the tests.
 

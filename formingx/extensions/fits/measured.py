@@ -1,127 +1,273 @@
-"""Tests from a CSV file with columns test, stretch, stress, and optionally time."""
+"""Tests from the CSV files of laboratories and testing machines, turned into stretch and nominal stress.
+
+The columns may hold stretch, strain or displacement, and nominal stress, true stress or force, under English or German
+names. A title may stand before the line that names the columns, and a line of units behind it.
+"""
+
+from __future__ import annotations
 
 import itertools
+import unicodedata
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...errors import InputError, check_name
+from ...errors import InputError, check_name, check_type, positive
 from ...io.csv_files import name_and_unit, records
 from ...io.numerals import is_number
 from ...materials.homogeneous import MODES
-from ...units import STRESSES
+from ...units import FORCES, LENGTHS, STRESSES
 
-_NAMES = {"test": "test", "mode": "test", "stretch": "stretch", "stress": "stress", "nominal stress": "stress",
-          "engineering stress": "stress", "time": "time"}
-_ORDER = ("test", "stretch", "stress", "time")
-_UNITS = {"stress": tuple(STRESSES), "time": ("s", "ms", "min", "h")}
+_QUANTITIES = {
+    "test": ("test", "mode", "versuch", "prufart"),
+    "stretch": ("stretch", "stretch ratio", "extension ratio", "lambda", "verstreckung", "streckverhaltnis"),
+    "strain": ("strain", "engineering strain", "nominal strain", "tensile strain", "dehnung", "technische dehnung",
+               "nominelle dehnung"),
+    "true strain": ("true strain", "hencky strain", "logarithmic strain", "log strain", "wahre dehnung",
+                    "logarithmische dehnung"),
+    "displacement": ("displacement", "extension", "elongation", "crosshead", "crosshead travel", "travel", "weg",
+                     "standardweg", "traversenweg", "verlangerung"),
+    "stress": ("stress", "nominal stress", "engineering stress", "tensile stress", "spannung", "technische spannung",
+               "nennspannung"),
+    "true stress": ("true stress", "cauchy stress", "wahre spannung"),
+    "force": ("force", "standard force", "load", "kraft", "standardkraft", "prufkraft"),
+    "time": ("time", "test time", "zeit", "prufzeit"),
+    "temperature": ("temperature", "temp", "temperatur", "pruftemperatur"),
+}
+"""{quantity: names of its column, in lower case and without accents}."""
+_NAMES = {name: quantity for quantity, names in _QUANTITIES.items() for name in names}
+_STRETCHES, _STRESSES = ("stretch", "strain", "true strain", "displacement"), ("stress", "true stress", "force")
+_UNITS: dict[str, tuple[str, ...]] = {
+    "strain": ("%", "mm/mm", "m/m"), "true strain": ("%",), "displacement": tuple(LENGTHS), "stress": tuple(STRESSES),
+    "true stress": tuple(STRESSES), "force": tuple(FORCES), "time": ("s", "ms", "min", "h"),
+    "temperature": ("C", "°C", "K", "degC", "Grad C")}
+_SPECIMEN = ("length", "width", "thickness", "area")
 
 
-def read_tests(file: Path) -> list[tuple[str, np.ndarray]]:
-    """Read the tests of a CSV file with the columns test, stretch, stress (nominal) and, for tests in time, time.
+class MeasuredTest(NamedTuple):
+    """Test from a file, with n points.
 
-    If the first line names the columns, their order is free. A test ends where its name changes or the time decreases.
+    Attributes:
+        mode: "uniaxial", "pure_shear" or "equibiaxial".
+        stretch: stretches, shape (n,).
+        stress: nominal stresses, shape (n,); nan for an empty cell.
+        times: times, shape (n,), or None.
+        temperature: temperature of the test, or None.
+        source: name of the file.
+        conversions: what was done to the columns, as text.
+    """
+
+    mode: str
+    stretch: np.ndarray
+    stress: np.ndarray
+    times: np.ndarray | None
+    temperature: float | None
+    source: str
+    conversions: tuple[str, ...]
+
+
+def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> list[MeasuredTest]:
+    """Read the tests of a CSV file.
+
+    Without a line that names them, the columns are test, stretch, nominal stress and, for tests in time, time. A test
+    ends where its name or its temperature changes, or the time decreases.
 
     Args:
         file: path of the CSV file.
+        test: name of the test, for a file without a column of it.
+        specimen: {"length": gauge length, "area": cross-section} of the specimen, in place of the area also "width" and
+            "thickness"; for columns of displacement and force. Lengths have the unit of the displacement, or mm.
 
     Returns:
-        List of (name of the test, array). The rows of the array are stretch, nominal stress and, if the file has it,
-        time, shape (2, n) or (3, n). An empty stress is nan.
+        The tests.
 
     Raises:
-        InputError: a file that cannot be read or has no rows, a first line without a required column or with an unknown
-            unit, or a malformed row.
+        InputError: a file that cannot be read or has no rows, a first line without a required column, with an unused
+            column or an unknown unit, or a malformed row.
     """
     caller = f"fit: data: {file}"
     try:
         rows = records(file)
     except InputError as error:
         raise InputError(f"fit: data: {error}") from None
-    head = rows[0][1] if rows and rows[0][1][0] not in MODES and not any(map(is_number, rows[0][1])) else None
-    body = rows if head is None else rows[1:]
+    start, columns, units = _head(caller, rows)
+    if columns is None:
+        columns = dict(zip(("test", "stretch", "stress", "time"), range(len(rows[0][1]) if rows else 0)))
+        units, width = {}, len(rows[0][1]) if rows else 0
+    else:
+        width = len(rows[start - 1][1])
+        if start < len(rows) and not any(map(is_number, rows[start][1])) and len(rows[start][1]) == width and not any(
+                cell in MODES for cell in rows[start][1]):              # a line of units
+            for name, k in columns.items():
+                units[name] = rows[start][1][k].strip("[]()") or units.get(name)
+            start += 1
+        columns = _checked_columns(caller, columns, rows, start, units, test)
+    body = rows[start:]
     if not body:
         raise InputError(f"{caller}: has no rows of test, stretch, stress")
-    width = len(body[0][1]) if head is None else len(head)
-    columns = list(range(width)) if head is None else _columns(caller, head)
-    points = [(_mode(f"{caller}, line {n}", row, width, columns), _numbers(f"{caller}, line {n}", row, columns))
-              for n, row in body]
-    numbered = zip(_test_numbers(points), points)
-    return [(group[0][1][0], np.array([numbers for _, (_, numbers) in group]).T)
-            for group in (list(found) for _, found in itertools.groupby(numbered, key=lambda x: x[0]))]
+    if test is not None:
+        check_name("fit: test", test, MODES)
+    points = [_point(f"{caller}, line {n}", row, width, columns, test) for n, row in body]
+    converted, conversions = _converted(caller, points, units, specimen)
+    found = []
+    for _, group in itertools.groupby(zip(_test_numbers(converted), converted), key=lambda pair: pair[0]):
+        part = [point for _, point in group]
+        times = np.array([p["time"] for p in part]) if "time" in part[0] else None
+        found.append(MeasuredTest(part[0]["test"], np.array([p["stretch"] for p in part]),
+                                  np.array([p["stress"] for p in part]), times, part[0].get("temperature"),
+                                  str(file), conversions))
+    return found
 
 
-def _columns(caller: str, head: list[str]) -> list[int]:
-    """Return the numbers of the columns with test, stretch, stress and, if there is one, time.
+def _head(caller: str, rows: list[tuple[int, list[str]]]) -> tuple[int, dict[str, int] | None, dict[str, Any]]:
+    """Return the line behind the one that names the columns, {quantity or name: column}, and {quantity: unit or None}.
 
-    Args:
-        caller: name of the caller and the file, for messages.
-        head: names of the columns, the first line of the file.
+    A title before it is skipped. Without such a line the result is (0, None, {}).
 
     Raises:
-        InputError: a missing or duplicate column, or an unknown unit.
+        InputError: two columns of one quantity, or an unknown unit.
     """
-    found: dict[str, int] = {}
-    for k, cell in enumerate(head):
-        words, unit = name_and_unit(cell)
-        name = _NAMES.get(" ".join(words.lower().replace("_", " ").split()), "")
-        if name in found:
-            raise InputError(f"{caller}: the first line names two columns {name!r}")
-        if name and unit is not None and unit not in _UNITS.get(name, ()):
+    for start, (_, row) in enumerate(rows, 1):
+        cells = [name_and_unit(cell) for cell in row]
+        quantities = [_NAMES.get(_plain(words)) for words, _ in cells]
+        if row and row[0] in MODES or len(row) > 1 and all(map(is_number, row)):
+            break
+        if sum(q is not None for q in quantities) < 2:
+            continue
+        columns: dict[str, int] = {}
+        units: dict[str, Any] = {}
+        for k, ((words, unit), quantity) in enumerate(zip(cells, quantities)):
+            name = quantity or words
+            if name in columns:
+                raise InputError(f"{caller}: the first line names two columns {name!r}")
+            columns[name] = k
+            if quantity is not None:
+                units[name] = unit
+        return start, columns, units
+    if rows and not any(map(is_number, rows[0][1])) and rows[0][1][0] not in MODES:
+        names = [name_and_unit(cell)[0] for cell in rows[0][1]]
+        raise InputError(f"{caller}: the first line names the columns {', '.join(map(repr, names))}: no 'stretch'; must"
+                         f" be test, stretch (or strain, displacement), stress (nominal, true, or force), and time if"
+                         f" any")
+    return 0, None, {}
+
+
+def _checked_columns(caller: str, columns: dict[str, int], rows: list[tuple[int, list[str]]], start: int,
+                     units: dict[str, Any], test: str | None) -> dict[str, int]:
+    """Return {quantity: column} of the columns that a fit uses, checked.
+
+    Columns of text that a fit does not use, such as a name of the specimen, are left out.
+
+    Raises:
+        InputError: a column of numbers that a fit does not use, a missing column, or an unknown unit.
+    """
+    what = ("must be test, stretch (or strain, displacement), stress (nominal, true, or force), and time if any")
+    names = ", ".join(repr(name_and_unit(cell)[0]) for cell in rows[start - 1][1] if not is_number(cell))
+    for needed in ((("test",),) if test is None else ()) + (_STRETCHES, _STRESSES):
+        found = [name for name in needed if name in columns]
+        if not found:
+            advice = "; or give fit(..., test='uniaxial')" if needed == ("test",) else ""
+            raise InputError(f"{caller}: the first line names the columns {names}: no {needed[0]!r}; {what}{advice}")
+        if len(found) > 1:
+            raise InputError(f"{caller}: the first line names both {found[0]!r} and {found[1]!r}: leave one of them out"
+                             f" of the file")
+    if test is not None and "test" in columns:
+        raise InputError(f"{caller}: has a column 'test': give no test={test!r}")
+    for name, k in columns.items():
+        numeric = any(k < len(row) and is_number(row[k]) for _, row in rows[start:])
+        if name not in _QUANTITIES and numeric:
+            raise InputError(f"{caller}: the first line names a column {name!r}, which a fit does not use: leave it out"
+                             f" of the file; used are {', '.join(_QUANTITIES)}")
+        unit = units.get(name)
+        if name in _QUANTITIES and unit is not None and unit not in _UNITS.get(name, ()):
             raise InputError(f"{caller}: column {name!r} is in {unit!r}: must be"
                              f" {'in one of ' + ', '.join(_UNITS[name]) if name in _UNITS else 'without a unit'}")
-        found |= {name: k} if name else {}
-    missing = [name for name in _ORDER[:3] if name not in found]
-    if missing:
-        raise InputError(f"{caller}: the first line names the columns {', '.join(map(repr, head))}: no {missing[0]!r};"
-                         f" must be test, stretch (length over first length), stress (nominal), and time if any")
-    return [found[name] for name in _ORDER if name in found]
+    return {name: k for name, k in columns.items() if name in _QUANTITIES}
 
 
-def _mode(where: str, row: list[str], width: int, columns: list[int]) -> str:
-    """Return the name of the test ("uniaxial", ...) in a row of the file, checked.
+def _plain(words: str) -> str:
+    """Return words in lower case, without accents, underscores and double spaces."""
+    plain = unicodedata.normalize("NFKD", words.lower()).encode("ascii", "ignore").decode()
+    return " ".join(plain.replace("_", " ").replace("-", " ").split())
 
-    Args:
-        where: file and line, for messages.
-        row: cells of the row.
-        width: number of cells that a row must have.
-        columns: numbers of the columns with test, stretch, stress and, if there is one, time.
+
+def _point(where: str, row: list[str], width: int, columns: dict[str, int], test: str | None) -> dict[str, Any]:
+    """Return a row of the file as {quantity: value}; an empty stress in a test in time is nan.
 
     Raises:
-        InputError: another number of cells, or an unknown test.
+        InputError: another number of cells, an unknown test, or a cell that is no number.
     """
-    if len(row) != width or len(columns) not in (3, 4):
+    if len(row) != width or len(columns) < 3 - (test is not None):
         raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"
                          f" time, the same in all lines")
-    check_name(f"{where}: test", row[columns[0]], MODES)
-    return row[columns[0]]
+    found: dict[str, Any] = {"test": test}
+    for name, k in columns.items():
+        if name == "test":
+            check_name(f"{where}: test", row[k], MODES)
+            found[name] = row[k]
+            continue
+        empty = row[k] == "" and name in _STRESSES and "time" in columns
+        if not is_number(row[k]) and not empty:
+            raise InputError(f"{where}: {row[k]!r}: must be a number")
+        found[name] = float(row[k] or "nan")
+    return found
 
 
-def _numbers(where: str, row: list[str], columns: list[int]) -> list[float]:
-    """Return the numbers in a row of the file: stretch, stress (nan if empty) and, if there is one, time.
+def _converted(caller: str, points: list[dict[str, Any]], units: dict[str, Any], specimen: Any
+               ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
+    """Return points with stretch and nominal stress, and what was done as text.
 
-    Args:
-        where: file and line, for messages.
-        row: cells of the row.
-        columns: numbers of the columns with test, stretch, stress and, if there is one, time.
+    Raises:
+        InputError: the size of the specimen is missing, not positive, or not used.
     """
-    cells = [row[k] for k in columns[1:]]
-    for i, cell in enumerate(cells):
-        if not is_number(cell) and not (cell == "" and i == 1 and len(cells) == 3):
-            raise InputError(f"{where}: {cell!r}: must be a number")
-    return [float(cell or "nan") for cell in cells]
+    given = dict(check_type("fit: specimen", {} if specimen is None else specimen, Mapping,
+                            "a dict such as {'length': 30.0, 'width': 4.0, 'thickness': 1.0}"))
+    for name in given:
+        check_name("fit: specimen", name, _SPECIMEN)
+        given[name] = positive(f"fit: specimen: {name}", given[name])
+    if "area" not in given and {"width", "thickness"} <= given.keys():
+        given["area"] = given["width"] * given["thickness"]
+    first, done = points[0], []
+    strain = next(name for name in _STRETCHES if name in first)
+    stress = next(name for name in _STRESSES if name in first)
+    percent = units.get(strain) == "%"
+    if strain == "displacement" and "length" not in given:
+        raise InputError(f"{caller}: has a displacement: give fit(..., specimen={{'length': ..., ...}}), the gauge"
+                         f" length")
+    if stress == "force" and "area" not in given:
+        raise InputError(f"{caller}: has a force: give fit(..., specimen={{'width': ..., 'thickness': ...}}), or its"
+                         f" 'area'")
+    if strain != "stretch":
+        done.append({"strain": "stretch = 1 + strain" + "/100" * percent,
+                     "true strain": "stretch = exp(true strain" + "/100" * percent + ")",
+                     "displacement": f"stretch = 1 + displacement/{given.get('length', 0):g}"}[strain])
+    if stress != "stress":
+        scale = FORCES[units.get("force") or "N"]
+        done.append({"true stress": "nominal stress = true stress / stretch",
+                     "force": f"nominal stress = force/{given.get('area', 0):g}" + f" x {scale:g}" * (scale != 1)
+                              + ", N per area of the specimen"}[stress])
+    found = []
+    for point in points:
+        value, load = point[strain] / (100.0 if percent else 1.0), point[stress]
+        stretch = {"stretch": value, "strain": 1 + value, "true strain": np.exp(min(value, 50.0)),
+                   "displacement": 1 + value / given.get("length", 1.0)}[strain]
+        nominal = {"stress": load, "true stress": load / stretch if stretch else np.nan,
+                   "force": load * FORCES[units.get("force") or "N"] / given.get("area", 1.0)}[stress]
+        found.append({k: v for k, v in point.items() if k in ("test", "time", "temperature")}
+                     | {"stretch": float(stretch), "stress": float(nominal)})
+    return found, tuple(done)
 
 
-def _test_numbers(points: list[tuple[str, list[float]]]) -> list[int]:
+def _test_numbers(points: list[dict[str, Any]]) -> list[int]:
     """Return for each row of a file the number of the test to which it belongs, counted from 0.
 
-    A test ends where its name changes or the time decreases.
-
-    Args:
-        points: for each row (name of the test, [stretch, stress] or [stretch, stress, time]).
+    A test ends where its name or its temperature changes, or the time decreases.
     """
     found, n = [], 0
-    for (mode, row), (before, last) in zip(points, [points[0], *points]):
-        n += mode != before or len(row) == 3 and row[2] < last[2]
+    for point, last in zip(points, [points[0], *points]):
+        n += (point["test"] != last["test"] or point.get("temperature") != last.get("temperature")
+              or point.get("time", 0.0) < last.get("time", 0.0))
         found.append(n)
     return found

@@ -22,11 +22,14 @@ class Uncertainty(NamedTuple):
         errors: {constant: standard error}.
         undetermined: names of the constants that the tests do not determine.
         covariance: covariance of the constants, shape (p, p), in the order of `errors`.
+        slopes: derivatives of the n stresses by the constants, each over the divisor of its misfit, shape (n, p); None
+            if they are not known.
     """
 
     errors: dict[str, float]
     undetermined: tuple[str, ...]
     covariance: np.ndarray
+    slopes: np.ndarray | None = None
 
 
 def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndarray, sizes: np.ndarray) -> Uncertainty:
@@ -68,7 +71,7 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
     with np.errstate(invalid="ignore"):
         covariance = np.where(inverse == 0, 0.0, error**2 * inverse)
     errors = {name: float(error * unit_error) for name, unit_error in zip(constants, unit_errors)}
-    return Uncertainty(errors, undetermined, covariance)
+    return Uncertainty(errors, undetermined, covariance, slopes)
 
 
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
