@@ -83,7 +83,7 @@ def test_friction_appears_in_files_and_reports():
     """A tool that is drawn from a file knows its friction in words."""
     path = pushed(RISING, 150.0, travel=0.05)[1]
     told = describe(path.problem)
-    assert told["contacts"][0]["friction"] == repr(RISING)
+    assert told["contacts"][0]["friction"] == {"kind": "table", "x": [20.0, 150.0], "y": [0.1, 0.4]}
     assert Tooling.of_description(told).contacts[0].friction == repr(RISING)
 
 

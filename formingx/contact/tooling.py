@@ -11,6 +11,7 @@ from ..errors import InputError
 from ..forms.schedule import StepData
 from ..physics.contact import Contact
 from ..tools.shapes import Arc, Line, Tool
+from ..values.table import table
 
 
 class Tooling(NamedTuple):
@@ -138,8 +139,10 @@ def _contact(data: dict[str, Any]) -> Contact:
     direction = data["direction"] and tuple(data["direction"])
     names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
     options = {name: data[name] for name in names if name in data}
-    words = isinstance(data["friction"], str) and data["friction"] not in ("stick", "none")
-    found = Contact(data["on"], tool_of(data["tool"]), "stick" if words else data["friction"], direction=direction,
-                    **options)
-    found.friction = data["friction"]                       # a function of the temperature is stored as text
+    friction = data["friction"]
+    if isinstance(friction, dict):                          # a function of the temperature is stored as plain data
+        friction = repr(table(dict(zip(friction["x"], friction["y"])))) if "x" in friction else str(friction)
+    words = isinstance(friction, str) and friction not in ("stick", "none")
+    found = Contact(data["on"], tool_of(data["tool"]), "stick" if words else friction, direction=direction, **options)
+    found.friction = friction
     return found
