@@ -7,6 +7,7 @@ import ufl
 
 from ..errors import InputError, check_name, finite, pair, positive, triple
 from ..forms.probes import probe
+from ..physics.loads import Pressure
 from .quantities import Form, Linear, Quantity, Sag, WholePartQuantity
 
 _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
@@ -399,7 +400,8 @@ def swept_volume(problem: Any) -> Any:
     kinematics, forms = problem.scene.kinematics, problem.forms
     N, face = forms.face(driven.on, 5)
     swept = sum(ufl.inner(forms.u, kinematics.area_vector(forms.constant(t) * forms.u, forms.X, N)) for t in _GAUSS)
-    return -swept / forms.constant(2 * _unit_of_volume(forms)) * face
+    share = driven.share(forms) if isinstance(driven, Pressure) else 1
+    return -share * swept / forms.constant(2 * _unit_of_volume(forms)) * face
 
 
 def _displacement(problem, points, factors):

@@ -98,6 +98,9 @@ class Pressure(Load):
         on: name of the boundary. A positive pressure pushes into the body.
         value: fixed pressure (stress); None: the pressure is a load parameter (control) of the run.
         name: name of the load in the stages of a `Process` and in the column names of results.
+        above: reference height: the pressure acts on the part of the boundary with Z (in three dimensions z) above it,
+            such as the part of a tube above its pinch-off; length. None: on all of the boundary. In three dimensions a
+            triangle belongs to the part if its centroid does.
 
     >>> scene.driven                                                                  # `trace` finds its value
     Pressure('bottom')
@@ -106,13 +109,29 @@ class Pressure(Load):
     quadrature_degree = 5
     quantity = "pressure"
 
-    def __init__(self, on: str, value: float | None = None, name: str | None = None):
+    described = ("above",)
+
+    def __init__(self, on: str, value: float | None = None, name: str | None = None, *, above: float | None = None):
         super().__init__(check_type("Pressure: on", on, str, "the name of a boundary"), value, name)
+        self.above = None if above is None else finite("Pressure: above", above)
+
+    def share(self, body: Any) -> Any:
+        """Return the share of the pressure that acts at a reference position, 1 or 0.
+
+        Args:
+            body: a `formingx.forms.loaded_body.LoadedBody`, or the forms, with the reference position `X`.
+
+        Returns:
+            The share (UFL scalar); the number 1 if the pressure acts on all of its boundary.
+        """
+        if self.above is None:
+            return 1
+        return ufl.conditional(ufl.gt(body.X[len(body.X) - 1], body.constant(self.above)), 1.0, 0.0)
 
     def virtual_work(self, body, value):
         face = body.face(self.on, self.quadrature_degree)
         area = body.kinematics.area_vector(body.u, body.X, face.normal)         # with its weight
-        return -value * ufl.inner(area, body.du) * face.measure
+        return -value * self.share(body) * ufl.inner(area, body.du) * face.measure
 
     def mode_work(self, body, value):
         r"""Return the change of the virtual work of the pressure by a non-axisymmetric mode v.
@@ -132,7 +151,10 @@ class Pressure(Load):
         """
         face = body.face(self.on, self.quadrature_degree)
         N = ufl.as_vector([face.normal[0], face.normal[1], 0])
-        return -value * face.integral(ufl.inner(cofactor_change(body.F, body.H) * N, body.dmode))
+        return -value * face.integral(self.share(body) * ufl.inner(cofactor_change(body.F, body.H) * N, body.dmode))
+
+    def __repr__(self) -> str:
+        return super().__repr__() if self.above is None else f"{super().__repr__()[:-1]}, above={self.above:g})"
 
     def unit(self, body):
         r"""Return the unit of the pressure: its value divided by its dimensionless amplitude.

@@ -87,6 +87,9 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
             if not isinstance(constraint, Constrained):
                 rows = rows.mean(0, keepdims=True)
             gram += rows.T @ rows / len(rows)
+    mesh: Any = scene.mesh
+    if scene.kinematics.components == 3 and not mesh.flat:
+        gram[3, :3] = gram[:3, 3] = 0.0                      # tension resists rotations about other axes than z
     values, vectors = np.linalg.eigh(gram)
     if values[0] < 1e-12:
         free = names[int(np.argmax(np.abs(vectors[:, 0])))]

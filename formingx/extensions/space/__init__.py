@@ -7,6 +7,7 @@ from ...mesh.files import SurfaceReader, surface_readers
 from ...physics.kinematics import ThreeD
 from . import scene_checks
 from .curved import stl_grid
+from .intersection import HalfSpace, Intersection
 from .reader import SheetReader
 from .solid_tool import SolidTool, Swept
 from .surface import Surface
@@ -28,6 +29,10 @@ def _tool(shape: dict[str, Any]) -> SolidTool:
     """Return a tool from the data of a checkpoint, {attribute of the tool: value}, such as {"name": "mould.stl"}."""
     if "parts" in shape:
         found: SolidTool = Union([_tool(part) for part in shape["parts"]], shape["names"])
+    elif "first" in shape:
+        found = Intersection(_tool(shape["first"]), _tool(shape["second"]), shape["fillet"])
+    elif "position" in shape:
+        found = HalfSpace(shape["axis"], shape["sign"], shape["position"])
     elif "profile" in shape:
         found = Swept(tool_of(shape["profile"]), shape["kind"], tuple(shape["half"]), shape["corner"], shape["along"])
     else:

@@ -55,7 +55,7 @@ def coarse_triangles(body: Any) -> Iterator[Finding]:
     if scene.kinematics.components != 3:
         return
     held = [scene.mesh.nodes_of(support.on) for support in scene.supports
-            if any(scene.kinematics.axes[c.component] == "z"
+            if not isinstance(support, Symmetry) and any(scene.kinematics.axes[c.component] == "z"
                    for c in scene.kinematics.in_axes(support, support.constraints()))]
     if not held:
         return

@@ -31,6 +31,7 @@ class SheetPart(PartNumbers):
         uniformity: minimum over mean wall thickness.
         variation: standard deviation of the wall thickness over the surface, over its mean.
         weight: weight in grams if a density in g/cm3 was given; else None.
+        capacity: volume that the part holds, length^3, up to its brim (`SheetWall.capacity`); None for a flat sheet.
         scrap: volume that is trimmed off over the volume of the sheet.
         wrinkled: share of the reference area that is in compression.
         basis: text that states from which modelled part volume, area and weight were computed, such as a quarter; ""
@@ -52,6 +53,7 @@ class SheetPart(PartNumbers):
     wrinkled: float
     basis: str = ""
     units: Units = field(repr=False, default=NONE)
+    capacity: float | None = None
 
     @property
     def rows(self) -> list[tuple[str, str]]:
@@ -59,7 +61,9 @@ class SheetPart(PartNumbers):
         deformed, reference = (", ".join(f"{v:.4g}" for v in position) for position in (
             self.min_wall_at, self.min_wall_reference))
         axes = "(X, Y)" if len(self.min_wall_reference) == 2 else "(X, Y, Z)"
-        return self._rows(f"(x, y, z) = ({deformed}), from {axes} = ({reference})", []) + (
+        holds = [] if self.capacity is None else [
+            ("capacity", self._with_unit(self.capacity, self.units.volume))]
+        return self._rows(f"(x, y, z) = ({deformed}), from {axes} = ({reference})", []) + holds + (
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 
 
@@ -103,7 +107,7 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
                      float(wall.wall[k] / mean),
                      float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
                      weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()),
-                     planes.basis(None), units)
+                     planes.basis(None), units, None if wall.flat else wall.capacity())
 
 
 def _positive_share(d: np.ndarray) -> np.ndarray:

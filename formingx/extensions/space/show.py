@@ -49,7 +49,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
         """Draw the part and the lines of the grid into the file, on rank 0."""
         pyvista = figures.pyvista()
         below = wall.deformed_points[:, 2].min() < -wall.deformed_points[:, 2].max()            # look into the part
-        camera = np.array([0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
+        camera = np.array([1.4, -2.6, 0.9] if not wall.flat else [0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
         size = np.ptp(wall.deformed_points, axis=0).max()
         lift = 0.004 * size * camera / np.linalg.norm(camera)           # else lines flicker
         values = wall.at_nodes / wall.to_nodes(wall.reference_thickness)

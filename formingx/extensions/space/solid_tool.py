@@ -318,6 +318,33 @@ def extruded(profile: Tool, along: str = "y") -> Swept:
     return Swept(check_type("extruded: profile", profile, Tool, "a Tool"), "extruded", along=along)
 
 
+def swept(profile: Tool, *, half: tuple[float, float], corner: float = 0.0) -> Swept:
+    """Return the rigid tool that a profile forms by a sweep round a rectangle with rounded corners.
+
+    Args:
+        profile: profile in the plane (r, z). Its radius r = min(half) follows the rectangle; other radii follow curves
+            at a constant distance from it.
+        half: half widths of the rectangle along x and y, length.
+        corner: radius of the corners of the rectangle, length.
+
+    Returns:
+        The tool.
+
+    Raises:
+        InputError: the profile is no tool of the plane, or the corner radius is above the smaller half width.
+
+    >>> line = [(0, -16), (10, -16), (35, -46), (35, -180), (0, -180)]
+    >>> body = fx.tools.swept(fx.Tool(line, [0, 0, 12, 6, 0]), half=(35.0, 35.0), corner=12.0)
+    >>> body.signed_distance([[0.0, 30.0, -100.0]]).tolist()
+    [-5.0]
+    """
+    check_type("swept: profile", profile, Tool, "a Tool")
+    a, b = (positive("swept: half", value) for value in pair("swept: half", half))
+    if non_negative("swept: corner", corner) > min(a, b):
+        raise InputError(f"swept: corner = {corner!r}: must be at most the smaller half width, {min(a, b):g}")
+    return Swept(profile, "box", (a, b), float(corner))
+
+
 def box(*, half: tuple[float, float], depth: float, corner: float = 0.0, fillet: float = 0.0, lip: float = 0.0,
         draft: float = 0.0, mouth: float = 0.0, plug: bool = False) -> Swept:
     """Return a box-shaped mould with rounded corners, open upwards, centred at x = y = 0; or the plug that fits it.

@@ -79,7 +79,7 @@ class Surface(Formulation):
         for load, value in pressures:
             face = body.face(load.on, load.quadrature_degree)
             area = self.scene.kinematics.area_vector(self.u, self.X, face.normal)
-            work = self._on_tools.work(value, area)
+            work = self._on_tools.work(load.share(self) * value, area)
             residual -= self._scale * work
             if load.driven:
                 by_control -= self._scale * ufl.diff(work, self._control)

@@ -160,6 +160,31 @@ def volume_within(points: np.ndarray, triangles: np.ndarray) -> float:
     return float(np.einsum("mi,mi->", corners.mean(1)[:, :2], area[:, :2]) / 2)
 
 
+def below(points: np.ndarray, triangles: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the part of a surface below a plane normal to z.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        level: coordinate z of the plane, length.
+
+    Returns:
+        Vertices of the part, shape (k, 3), length; vertex numbers of its triangles, shape (j, 3); for each of these the
+        number of the triangle of the surface, shape (j,).
+    """
+    under = points[triangles][..., 2] <= level
+    whole, cut = np.flatnonzero(under.all(1)), np.flatnonzero(under.any(1) & ~under.all(1))
+    first = np.where(under[cut].sum(1) == 1, under[cut].argmax(1), (~under[cut]).argmax(1))    # alone on its side
+    a, b, c = (points[np.take_along_axis(triangles[cut], ((first + k) % 3)[:, None], 1)[:, 0]] for k in range(3))
+    p, q = (a + ((level - a[:, 2:]) / (end - a)[:, 2:]) * (end - a) for end in (b, c))
+    single = under[cut].sum(1) == 1
+    tips = np.stack([a, p, q], 1)[single]
+    rests = np.concatenate([np.stack([p, b, c], 1)[~single], np.stack([p, c, q], 1)[~single]])
+    corners = np.concatenate([points[triangles[whole]], tips, rests])
+    owner = np.concatenate([whole, cut[single], cut[~single], cut[~single]])
+    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), owner
+
+
 def surface_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str, faces: tuple[str, str],
                  layers: Sequence[str] = ("sheet",), **more: Any) -> SurfaceMesh:
     """Return the distributed mesh of a surface; collective.

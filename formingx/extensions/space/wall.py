@@ -9,13 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, direction, pair, positive, triple
+from ...errors import InputError, direction, finite, pair, positive, triple
 from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.edges import edges_of
 from ...mesh.nodes import cell_node_positions, own_cells, without_round_off
 from ...ranks import gathered
 from ...results.files.column_table import ColumnTable
 from .surface import wrinkled
+from .surface_mesh import below, volume_within
 
 
 @dataclass(frozen=True, repr=False)
@@ -28,6 +29,7 @@ class SheetWall(ColumnTable):
         triangles: nodes of each triangle, shape (m, 3), counter-clockwise seen from the face "top" or "outer".
         layers: {layer: reference thickness at the centroid of each triangle, shape (m,), length}.
         comm: MPI communicator of the run.
+        images: number of images of the modelled body in the whole part, such as 4 for a quarter.
     """
 
     reference_points: np.ndarray
@@ -35,6 +37,7 @@ class SheetWall(ColumnTable):
     triangles: np.ndarray
     layers: Mapping[str, np.ndarray]
     comm: Any
+    images: int = 1
 
     @cached_property
     def reference_area(self) -> np.ndarray:
@@ -144,6 +147,34 @@ class SheetWall(ColumnTable):
             raise InputError(f"thickness_at: ({', '.join(f'{v:.6g}' for v in place)}) is not on the modelled sheet,"
                              f" {spans}")
         return float(self.at_nodes[np.argmin(away)])
+
+    def capacity(self, level: float | None = None) -> float:
+        r"""Return the volume that the whole part holds, such as a bottle.
+
+        .. math:: V = \frac{1}{2} \int_{\gamma} (x n_x + y n_y) \, da - \int_{\gamma} h \, da
+
+        The integrals run over the deformed surface below the level, n is its normal and h its wall thickness. Lids
+        normal to z close the openings. A blown part touches its mould with its outer face, so the whole wall lies
+        inside the surface. Planes of symmetry must be x = 0 or y = 0.
+
+        Args:
+            level: coordinate z up to which the part is filled, length; None: to the brim.
+
+        Returns:
+            Volume, length^3.
+
+        Raises:
+            InputError: a level that the part does not reach.
+        """
+        points, triangles, owner = self.deformed_points, self.triangles, np.arange(len(self.triangles))
+        if level is not None:
+            low, high = points[:, 2].min(), points[:, 2].max()
+            if not low < finite("capacity: level", level) <= high:
+                raise InputError(f"capacity: level = {level!r}: must be a z of the part, from {low:.6g} to {high:.6g}")
+            points, triangles, owner = below(points, triangles, level)
+        corners = points[triangles]
+        area = np.linalg.norm(_normals(corners), axis=1)
+        return self.images * (volume_within(points, triangles) - float(self.wall[owner] @ area))
 
     def mean_ratio(self, point: tuple[float, float, float], radius: float) -> float:
         """Return the mean ratio of deformed to reference thickness around a point of the part.
@@ -313,7 +344,7 @@ def wall_of(path: Any, state: Any) -> SheetWall:
     keys = np.round(rest / max(problem.scene.extent), 10)
     _, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     layers = {name: gathered(comm, values)[order] for name, values in h.items()}
-    return SheetWall(rest[first], moved[first], row.reshape(-1, 3), layers, comm)
+    return SheetWall(rest[first], moved[first], row.reshape(-1, 3), layers, comm, problem.scene.symmetry_factor)
 
 
 def _normals(corners: np.ndarray) -> np.ndarray:

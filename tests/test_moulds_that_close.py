@@ -1,0 +1,129 @@
+"""Moulds of several parts in three dimensions: intersections, half moulds, pressure on a part, capacity, pinch-off."""
+
+import numpy as np
+import pytest
+from test_tubes import CAPPED, SYMMETRIES, scene
+
+import formingx as fx
+from formingx.extensions.space.surface_mesh import below
+
+BODY = fx.tools.swept(fx.Tool([(0, -16), (10, -16), (35, -46), (35, -180), (0, -180)], [0, 0, 12, 6, 0]),
+                      half=(35.0, 35.0), corner=12.0)
+NECK = fx.tools.revolved(fx.Tool([(17, 10), (17, -60), (0, -60)]))
+BOTTLE = fx.tools.intersection(BODY, NECK, fillet=4.0)
+
+
+def test_cavity_of_an_intersection_is_the_union_of_the_cavities():
+    x = np.random.default_rng(2).uniform((-40, -40, -185), (40, 40, 5), (4000, 3))
+    body, neck, both = (tool.signed_distance(x) for tool in (BODY, NECK, BOTTLE))
+    outside = np.maximum(-body, -neck) > 0
+    assert np.all((both < 0) | ~outside)
+    far = np.maximum(np.abs(body), np.abs(neck)) > 4.0
+    sharp = np.minimum(body, neck)
+    assert np.abs((both - sharp)[far & (sharp > 4)]).max() < 1e-12
+    assert (both <= sharp + 1e-12).all()
+
+
+def test_edge_of_an_intersection_of_normal_planes_is_an_exact_fillet():
+    side = fx.tools.extruded(fx.Tool([(0.0, 50.0), (0.0, -50.0)]))              # solid x > 0
+    top = fx.tools.extruded(fx.Tool([(50.0, 0.0), (-50.0, 0.0)]))               # solid z < 0
+    assert side.signed_distance([[1.0, 0, 0]])[0] == 1.0 and top.signed_distance([[0, 0, -2.0]])[0] == 2.0
+    edge = fx.tools.intersection(side, top, fillet=3.0)
+    angle = np.linspace(0.1, 1.4, 7)
+    points = np.column_stack([3 - 3 * np.cos(angle), 0 * angle, -3 + 3 * np.sin(angle)])
+    assert edge.signed_distance(points) == pytest.approx(0 * angle, abs=1e-12)
+    away = np.column_stack([3 - 3.5 * np.cos(angle), 0 * angle, -3 + 3.5 * np.sin(angle)])
+    assert edge.signed_distance(away) == pytest.approx(0 * angle - 0.5, abs=1e-12)
+
+
+def test_derivatives_of_an_intersection_are_difference_quotients():
+    x = np.random.default_rng(3).uniform((-30, -30, -60), (30, 30, -2), (400, 3))
+    x = x[np.abs(BOTTLE.signed_distance(x)) < 8]
+    found, h = BOTTLE.distances(x), 1e-5
+    steps = h * np.eye(3)
+    gradient = np.stack([(BOTTLE.signed_distance(x + e) - BOTTLE.signed_distance(x - e)) / (2 * h) for e in steps], 1)
+    hessian = np.stack([(BOTTLE.distances(x + e).normal - BOTTLE.distances(x - e).normal) / (2 * h) for e in steps], 2)
+    smooth = np.abs(hessian).max((1, 2)) < 1.0                                  # not across an edge
+    assert smooth.mean() > 0.95
+    assert np.abs(found.normal - gradient)[smooth].max() < 1e-6
+    assert np.abs(found.hessian - hessian)[smooth].max() < 1e-5
+
+
+def test_half_moulds_fill_the_whole_mould_and_stand_apart():
+    x = np.random.default_rng(4).uniform((-40, -40, -185), (40, 40, 5), (2000, 3))
+    halves = [fx.tools.half(BOTTLE, normal=normal) for normal in ("x", "-x")]
+    assert np.max([half.signed_distance(x) for half in halves], axis=0) == pytest.approx(np.minimum(
+        BOTTLE.signed_distance(x), np.abs(x[:, 0])))
+    opened = halves[0].moved(x=25.0)
+    assert opened.signed_distance(x + [25, 0, 0]) == pytest.approx(halves[0].signed_distance(x))
+    assert opened.surface()[0][:, 0].min() > 24.9
+    with pytest.raises(fx.InputError, match="half: normal"):
+        fx.tools.half(BOTTLE, normal="r")
+
+
+def test_pressure_above_a_height_acts_on_this_part_alone():
+    mesh = fx.mesh.tube(radius=16.0, length=60.0, elements=(12, 4), part="quarter")
+    found = fx.Scene(mesh=mesh, thickness=2.0, materials=fx.NeoHookean(c10=0.5),
+                     loads=[fx.Pressure("inner", above=-30)], supports=[fx.Clamped("neck"), fx.Clamped("end"), *SYMMETRIES["quarter"]])
+    assert repr(found.loads[0]) == "Pressure('inner', above=-30)"
+    path = fx.trace(found, until=fx.enclosed_volume(2000.0), progress=False)
+    wall = path.wall()
+    grown = np.hypot(*wall.deformed_points[:, :2].T) - np.hypot(*wall.reference_points[:, :2].T)
+    z = wall.reference_points[:, 2]
+    assert grown[z > -25].max() > 3 * np.abs(grown[z < -40]).max()
+    section = fx.Scene(mesh=fx.mesh.parison(inner_radius=10, thickness=2, length=60, elements=(20, 1)),
+                       materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner", above=20.0)],
+                       supports=[fx.Symmetry("axis"), fx.Clamped("neck")])
+    bent = fx.trace(section, until=fx.enclosed_volume(1000.0), progress=False)
+    assert bent.last.measures["pressure"] > 0
+
+
+def test_capacity_to_the_brim_and_to_a_fill_height():
+    path = fx.trace(scene(), until=fx.enclosed_volume(3e4), progress=False)
+    wall, part = path.wall(), path.part()
+    first = 4 * path.problem.scene.mesh.enclosed_volume()
+    assert part.capacity == pytest.approx(first + 3e4 - part.volume)
+    levels = np.linspace(-95, 0, 20)
+    volumes = [wall.capacity(level) for level in levels]
+    assert np.all(np.diff(volumes) > 0) and volumes[-1] == pytest.approx(part.capacity)
+    points, triangles, owner = below(wall.deformed_points, wall.triangles, -50.0)
+    assert points[:, 2].max() == pytest.approx(-50.0) and owner.max() < len(wall.triangles)
+    lid = wall.section((0, 0, -50), (0, 0, 1))
+    angle = np.argsort(np.arctan2(lid["y"], lid["x"]))
+    x, y = lid["x"][angle], lid["y"][angle]
+    area = 2 * np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])
+    slope = (wall.capacity(-49.5) - wall.capacity(-50.5)) / 1.0
+    assert slope == pytest.approx(area - 2 * np.pi * np.hypot(x, y).mean() * lid["wall"].mean(), rel=0.03)
+    with pytest.raises(fx.InputError, match="capacity: level"):
+        wall.capacity(5.0)
+
+
+@pytest.mark.thorough
+def test_halves_pinch_an_open_tube_flat():
+    mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(30, 5), part="quarter")
+    closing = fx.Scene(
+        mesh=mesh, thickness=2.5, materials=fx.MooneyRivlin(c10=0.05, c01=0.015), model=fx.Membrane(wrinkles=0.01),
+        supports=[fx.Clamped("neck"), fx.Symmetry("end", "z", guide=True), *SYMMETRIES["quarter"]],
+        loads=[fx.Pressure("inner", name="air", above=-180.0)],
+        contacts=[fx.Contact("outer", fx.tools.half(BOTTLE).moved(x=40.0), "stick", direction=(-1, 0, 0),
+                             name="mould")])
+    path = fx.Process(closing).run([fx.Stage("pre-blow", control="air", until=fx.pressure(0.002)),
+                                    fx.Stage("close", control="mould", until=fx.travel(40.0))], progress=False)
+    wall = path.wall()
+    tail = wall.deformed_points[(wall.reference_points[:, 2] < -185)]
+    assert tail[:, 0].max() < 0.05
+    assert 0.95 < tail[:, 1].max() / (np.pi / 2 * 16) < 1.01
+
+
+def test_a_checkpoint_restores_an_intersection(tmp_path):
+    half = fx.tools.half(BOTTLE).moved(x=30.0)
+    mesh = fx.mesh.tube(**CAPPED)
+    held = scene(mesh, contacts=[fx.Contact("outer", half, "stick", direction=(-1, 0, 0), name="mould")],
+                 loads=[fx.Pressure("inner", name="air")])
+    path = fx.Process(held).run([fx.Stage("blow", control="air", until=fx.pressure(1e-3))],
+                                progress=False, checkpoint=tmp_path / "run")
+    from formingx.contact.tooling import tool_of
+    from formingx.results.files.description import plain
+    x = np.random.default_rng(5).uniform(-40, 40, (50, 3))
+    assert tool_of(plain(half)).signed_distance(x) == pytest.approx(half.signed_distance(x))
+    assert len(path) > 1
