@@ -64,7 +64,8 @@ def test_half_moulds_fill_the_whole_mould_and_stand_apart():
 def test_pressure_above_a_height_acts_on_this_part_alone():
     mesh = fx.mesh.tube(radius=16.0, length=60.0, elements=(12, 4), part="quarter")
     found = fx.Scene(mesh=mesh, thickness=2.0, materials=fx.NeoHookean(c10=0.5),
-                     loads=[fx.Pressure("inner", above=-30)], supports=[fx.Clamped("neck"), fx.Clamped("end"), *SYMMETRIES["quarter"]])
+                     loads=[fx.Pressure("inner", above=-30)],
+                     supports=[fx.Clamped("neck"), fx.Clamped("end"), *SYMMETRIES["quarter"]])
     assert repr(found.loads[0]) == "Pressure('inner', above=-30)"
     path = fx.trace(found, until=fx.enclosed_volume(2000.0), progress=False)
     wall = path.wall()

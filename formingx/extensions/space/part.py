@@ -176,7 +176,7 @@ def filling(path: Any, contact: Any) -> SheetFilling:
             x = contact.positions(fields, state.control)
             d = tool.signed_distance(x)
             closed = contact.touching(fields, state.control) | (d > -0.1 * contact.thickness)
-            forces = contact.area[:, None] * contact.tractions(fields, state.control).force if names else None
+            forces: Any = contact.area[:, None] * contact.tractions(fields, state.control).force if names else None
         area = contact.rule.area
         nearest = tool.nearest_parts(x) if names else None
         shares = [np.append(area[closed & (nearest == k)].sum(), forces[nearest == k].sum(0))
