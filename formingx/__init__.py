@@ -13,7 +13,7 @@ The examples of all classes and functions begin with these lines (mm and MPa):
 import sys as _sys
 
 from . import _solver_wheel  # isort: skip  # loads MPI, before any other module
-from . import _calls, _interrupts, mesh, tools
+from . import _calls, _interrupts, exact, mesh, tools
 from ._extensions import add as _add
 from ._extensions import optional as _optional
 from .checks.check import check

@@ -232,3 +232,25 @@ found.to_csv({str(tmp_path / 'pairs.csv')!r})
 print([round(d.maximum, 9) for d in found.differences.values()]) if MPI.COMM_WORLD.rank == 0 else None"""
     assert run_script(script, ranks=2) == run_script(script)
     assert len((tmp_path / "pairs.csv").read_text().splitlines()) == 5
+
+
+def test_walls_of_sheets_are_compared_at_their_positions():
+    """Two meshes of one flat sheet: the walls of a smooth field agree at (X, Y), whatever the number of triangles."""
+    def table(n, seed, shift=0.0):
+        X, Y = np.random.default_rng(seed).uniform(-1, 1, (2, n))
+        return {"X": X, "Y": Y, "x": X, "wall": 1 + 0.3 * X * Y + 0.1 * X**2 + shift}
+    same = fx.compare(table(2000, 0), table(700, 1))
+    assert same.along == "X, Y" and set(same.differences) == {"wall"} and same.limit_points == ([], [])
+    assert same.differences["wall"].rms < 0.005 * same.differences["wall"].range
+    thicker = fx.compare(table(2000, 0), table(700, 1, shift=0.05))
+    assert thicker.differences["wall"].rms == pytest.approx(0.05, rel=0.03)
+    assert "at the same X, Y" in str(thicker) and "limit points" not in str(thicker)
+    assert len(thicker.plot().axes) == 4
+    with pytest.raises(fx.InputError, match="no point \\(X, Y\\) of theirs"):
+        far = table(50, 2)
+        fx.compare(table(100, 0), far | {"X": far["X"] + 9})
+
+
+def test_a_component_in_place_of_a_displacement_is_named():
+    with pytest.raises(fx.InputError, match="first argument is the displacement .* component='r'"):
+        fx.displacement("r", at=(1.0, 0.0))

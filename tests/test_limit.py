@@ -9,12 +9,20 @@ import pytest
 from conftest import ROOT, run
 from scipy.spatial import cKDTree
 
+import formingx as fx
 from formingx.forms.material_history import MaterialHistory
 from formingx.mesh import nodes as mesh_nodes
 from formingx.solve.newton import BorderedNewton
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import limit  # noqa: E402
+
+
+def test_closed_forms_are_reached_by_their_names():
+    """As the pages name them; each module is loaded at its first use."""
+    assert fx.exact.inflation.membrane_inflation is not None and {"heat", "time"} <= set(dir(fx.exact))
+    with pytest.raises(AttributeError, match="no attribute 'inflations'; it has heat"):
+        fx.exact.inflations  # noqa: B018
 
 
 def test_importing_loads_no_optional_modules():

@@ -263,7 +263,7 @@ def displacement(value: float, *, at: tuple[float, ...], component: str = "z") -
     """Return the target that a displacement component of a material point reaches a value.
 
     Args:
-        value: the displacement, length.
+        value: the displacement that is to be reached, length; 0 is where the point was at the start.
         at: position of the point in the reference configuration, length: (R, Z), for a flat sheet in three dimensions
             (x, y), for another surface (x, y, z) of a node or of a point of a triangle.
         component: "r" or "z"; in three dimensions "x", "y" or "z".
@@ -277,6 +277,9 @@ def displacement(value: float, *, at: tuple[float, ...], component: str = "z") -
     >>> fx.displacement(3.0, at=(5.0, 0.0)).name
     'u_z_at_5_0'
     """
+    if isinstance(value, str):
+        raise InputError(f"displacement: value = {value!r}: the first argument is the displacement that is to be"
+                         f" reached, a length; the component is displacement(1.0, at={at!r}, component={value!r})")
     at = triple("displacement: at", at) if np.size(at) == 3 else pair("displacement: at", at)
     if not isinstance(component, str) or component not in ("r", "z", "x", "y"):
         raise InputError(f"displacement: component = {component!r}: must be 'r' or 'z' (in three dimensions"

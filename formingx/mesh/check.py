@@ -35,7 +35,8 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
     longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(1) for i in range(3)], axis=0)
     flat = np.abs(area) <= ROUND_OFF * longest
     if flat.any():
-        raise InputError(f"{what}: {flat.sum()} elements are flat, one at {show(corners[flat][0].mean(0))}")
+        raise InputError(f"{what}: {flat.sum()} elements are flat, their corners lie on one line, one at"
+                         f" {show(corners[flat][0].mean(0))}")
     inside_out = inverted(points[triangles])
     if inside_out.any():
         raise InputError(f"{what}: {inside_out.sum()} elements are turned inside out, one at"

@@ -43,7 +43,8 @@ def check_surface(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
     longest = np.max([((corners[:, i] - corners[:, i - 1]) ** 2).sum(1) for i in range(3)], axis=0)
     flat = area <= ROUND_OFF * longest
     if flat.any():
-        raise InputError(f"{what}: {flat.sum()} elements are flat, one at {show(corners[flat][0].mean(0))}")
+        raise InputError(f"{what}: {flat.sum()} elements are flat, their corners lie on one line, one at"
+                         f" {show(corners[flat][0].mean(0))}")
     _, first, number = np.unique(np.round(points / size, 10), axis=0, return_index=True, return_counts=True)
     if (number > 1).any():
         raise InputError(f"{what}: two nodes lie at {show(points[first[number > 1][0]])}: elements that meet share"

@@ -187,11 +187,11 @@ class Path(States):
         return self._reader.report(file, title, failure, units or NONE, density, trim)
 
     def plot(self, y: str, x: str, axes: Axes | None = None, **style: Any) -> Any:
-        """Draw column `y` over column `x` along the path, with a dot at each state.
+        """Draw column `y` (first, vertical axis) over column `x` (horizontal axis), with a dot at each state.
 
         Args:
-            y: name of a column.
-            x: name of a column.
+            y: name of the column on the vertical axis.
+            x: name of the column on the horizontal axis.
             axes: matplotlib axes; default new ones.
             style: keyword arguments of matplotlib's `plot`.
 

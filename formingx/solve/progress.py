@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import sys
 import time
 from collections import Counter
 from collections.abc import Sequence
@@ -198,6 +199,8 @@ class RunTargets:
 class Progress:
     """Display of the progress of a run, on rank 0: a bar after two seconds, and log lines at intervals.
 
+    Without a terminal or a notebook there are log lines alone.
+
     Args:
         comm: MPI communicator of the run.
         words: text before the progress.
@@ -213,7 +216,7 @@ class Progress:
         self._words, self._here = words, comm.rank == 0
         self._level = logging.WARNING if shown else logging.INFO          # INFO is hidden by default
         self._bar = None
-        if shown and comm.rank == 0:
+        if shown and comm.rank == 0 and (sys.stderr.isatty() or "ipykernel" in sys.modules):     # no bar in a log file
             from tqdm import tqdm
             self._bar = tqdm(total=1.0, desc=words, delay=2, leave=False,
                              bar_format="{desc}: {percentage:3.0f}% |{bar}| {elapsed}{postfix}")

@@ -18,6 +18,9 @@ from ...results.show import plots
 from ...values.tolerances import FAR
 from .curves import SampledCurve, arc_length, pair_at_equal_values, pair_in_order, ranges, resolution_of
 
+_MAP = ("X", "Y")
+"""Columns with the positions of the centroids of triangles on the flat sheet."""
+
 
 @dataclass(frozen=True)
 class Difference:
@@ -60,7 +63,8 @@ class Comparison:
             is left out. The resolution is the largest distance of a point left out from the curve through the others. A
             difference below a tenth of the resolution may come from interpolation. A `Path` also knows its tangents, so
             its curve is more accurate.
-        along: independent column at whose values the others are compared; "" for pairs by arc length.
+        along: independent column at whose values the others are compared; "X, Y" for maps of walls; "" for pairs by
+            arc length.
     """
 
     columns: list[str]
@@ -82,7 +86,8 @@ class Comparison:
         compared = self.theirs[self.pairs[0]]
         how = f"at the same {self.along}" if self.along else "paired by arc length"
         omitted = self.points_beyond_ends
-        lines = [f"{len(compared)} of {len(self.theirs)} points of theirs compared with our curve through"
+        kind = "map" if self.along == ", ".join(_MAP) else "curve"
+        lines = [f"{len(compared)} of {len(self.theirs)} points of theirs compared with our {kind} through"
                  f" {len(self.ours)}, {how}" + (f"; {omitted} lie beyond its ends" if omitted else ""),
                  f"{'theirs minus ours':24}{'largest':>13}{'of range':>10}{'rms':>13}{'of range':>10}   largest at"]
         for name, d in self.differences.items():
@@ -91,6 +96,10 @@ class Comparison:
             where = ", ".join(f"{c} {v:.6g}" for c, v in zip(self.columns, compared[d.argmax]))
             lines.append(f"{name:24}{d.values[d.argmax]:13.5g}{_percent(d.maximum / d.range)}{d.rms:13.5g}"
                          f"{_percent(d.rms / d.range)}   {where}")
+        if self.along == ", ".join(_MAP):
+            ours, theirs = self.resolution
+            return "\n".join([*lines, f"with every other triangle left out, our map moves by {ours:.1e} of its range,"
+                                      f" theirs by {theirs:.1e}"])
         lines.append(f"{'limit points':24}{'':13}" + "".join(f"{c:>16}" for c in self.columns))
         for k, (a, b) in enumerate(zip_longest(*self.limit_points), 1):
             for side, point in (("ours", a), ("theirs", b)):
@@ -116,6 +125,15 @@ class Comparison:
             The matplotlib figure.
         """
         figure, (left, right) = plots.figure(2)
+        if self.along == ", ".join(_MAP):
+            name, d = next(iter(self.differences.items()))
+            points = self.theirs[self.pairs[0]]
+            for axes, values, label in ((left, self.pairs[1][:, 2], f"our {name}"),
+                                        (right, 100 * d.values / d.range, "theirs minus ours, % of range")):
+                drawn = axes.tripcolor(*points[:, :2].T, values, shading="gouraud")
+                axes.set(xlabel="X", ylabel="Y", aspect="equal")
+                figure.colorbar(drawn, ax=axes, label=label.replace("_", " "))
+            return figure
         y, x = self.columns[:2]
         line, = left.plot(self.line[:, 1], self.line[:, 0], label="ours")
         left.plot(self.theirs[:, 1], self.theirs[:, 0], "kx", markersize=5, label="theirs")
@@ -154,6 +172,9 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     is monotonic on both sides is the independent variable: the others are compared at equal values of it, as walls at
     the same radius. Of several such columns, the one over which the curve is flattest is chosen.
 
+    Walls of two sheets in three dimensions, tables with the columns X, Y and wall, are compared at the same positions
+    (X, Y) of the flat sheet: our walls are interpolated to theirs.
+
     If every column turns back, the points are paired by arc length, with each column divided by its range. Both arc
     lengths increase together, and the sum of squared distances is minimal. So a shift along the curve counts as no
     difference: the differences are measured across the curve. Points of theirs beyond the ends of our curve are left
@@ -182,6 +203,12 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
     0.01
     """
     left, right = _table("compare: ours", ours), _table("compare: theirs", theirs)
+    if along is None and units is None and all(
+            {*_MAP, "wall"} <= {*side.columns} and "Z" not in side.columns for side in (left, right)):
+        names = as_list("compare: columns", columns, "names") if columns is not None and not isinstance(
+            columns, Mapping) else None
+        if columns is None or names is not None and {*names} <= {*_MAP, "wall", "wall_ratio"}:
+            return _compare_maps(left, right, [n for n in names or ["wall"] if n not in _MAP] or ["wall"])
     pairs = _columns(left, right, columns)
     units = check_type("compare: units", {} if units is None else units, Mapping, "{our name: factor or unit}")
     for name in units:
@@ -213,6 +240,51 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
                       (_limit_points(left, a, names, control),
                        _limit_points(right, b, names, control)),
                       (resolution_of(a / scale, k), resolution_of(b / scale, k)), "" if k is None else names[k])
+
+
+def _compare_maps(left: csv_files.CsvTable, right: csv_files.CsvTable, names: list[str]) -> Comparison:
+    """Return the comparison of two maps of walls at the positions (X, Y) of theirs.
+
+    Args:
+        left: our table, with the columns X and Y.
+        right: their table.
+        names: columns to compare.
+
+    Raises:
+        InputError: no point of theirs lies within ours.
+    """
+    from scipy.interpolate import LinearNDInterpolator
+    ours, theirs = (np.column_stack([side.take(c, side.units[c]) for c in (*_MAP, *names)]) for side in (left, right))
+    found = LinearNDInterpolator(ours[:, :2], ours[:, 2:])(theirs[:, :2])
+    matched = np.flatnonzero(np.isfinite(found).all(1))
+    if not len(matched):
+        raise InputError("compare: no point (X, Y) of theirs lies within ours: are both maps of the same sheet, in the"
+                         " same units?")
+    partners = np.column_stack([theirs[matched, :2], found[matched]])
+    scale = ranges(ours)
+    differences = {}
+    for k, name in enumerate(names, 2):
+        values = theirs[matched, k] - partners[:, k]
+        index = int(np.argmax(np.abs(values)))
+        differences[name] = Difference(values, float(scale[k]), float(abs(values[index])), index,
+                                       float(np.sqrt(np.mean(values**2))))
+    return Comparison([*_MAP, *names], ours, theirs, ours, (matched, partners), differences, ([], []),
+                      (_map_resolution(ours, scale), _map_resolution(theirs, ranges(theirs))), ", ".join(_MAP))
+
+
+def _map_resolution(points: np.ndarray, scale: np.ndarray) -> float:
+    """Return the largest change of a map at every other point if these are left out, over its range.
+
+    Args:
+        points: X, Y and the compared columns at n points, shape (n, c).
+        scale: range of each column, shape (c,).
+    """
+    from scipy.interpolate import LinearNDInterpolator
+    if len(points) < 8:
+        return np.nan
+    kept = points[::2]
+    change = np.abs(LinearNDInterpolator(kept[:, :2], kept[:, 2:])(points[1::2, :2]) - points[1::2, 2:])
+    return float(np.nanmax(change / scale[2:])) if np.isfinite(change).any() else np.nan
 
 
 def _percent(share: float) -> str:
