@@ -209,3 +209,44 @@ def test_runs_in_processes():
     found = fx.study(inflate, {"modulus": [1.0, 3.0]}, {"p": "pressure"}, workers=2, progress=False)
     a, b = (run.measures["p"] for run in found.runs)
     assert b == pytest.approx(3 * a, rel=1e-8) and math.isfinite(a) and found.columns["seconds"].min() > 0
+
+
+def fake_study(rows, goal):
+    """A study whose runs are given, (values, measures)."""
+    from formingx.extensions.study.study import Study, StudyRun
+    study = Study(SimpleNamespace(measures=dict.fromkeys(rows[0][1])), list(rows[0][0]), goal, None)
+    fields = {field.name for field in dataclasses.fields(StudyRun)}
+    for values, measures in rows:
+        given = {"values": values, "measures": measures, "seconds": 0.0, "error": "", "number": 0, "findings": []}
+        study.runs.append(StudyRun(**{name: given[name] for name in fields if name in given}))
+    return study
+
+
+def test_sobol_indices_of_a_polynomial():
+    """y = 4 a + 2 b + a b on [-1, 1]^3: variances 16/3, 4/3 and 1/9; c has no effect."""
+    grid = np.array(np.meshgrid(*[[-1.0, 0.0, 1.0]] * 3)).reshape(3, -1).T
+    study = fake_study([({"a": a, "b": b, "c": c}, {"y": 4 * a + 2 * b + a * b}) for a, b, c in grid], {"y": "max"})
+    found, total = study.sensitivities("y"), 16 / 3 + 4 / 3 + 1 / 9
+    assert list(found.total)[:2] == ["a", "b"] and found.deviation < 1e-9
+    assert found.first["a"] == pytest.approx(16 / 3 / total, abs=0.02)
+    assert found.total["b"] == pytest.approx((4 / 3 + 1 / 9) / total, abs=0.02) and found.total["c"] < 0.01
+    assert "total" in str(found)
+    with pytest.raises(fx.InputError, match="is not known"):
+        study.sensitivities("z")
+
+
+def test_pareto_front_of_the_goal_ends_its_line_at_a_gap():
+    rows = [({"x": x}, {"a": x, "b": 1 - x}) for x in (0.0, 0.1, 0.2, 0.3, 0.9, 1.0)]
+    study = fake_study(rows, {"a": "max", "b": "max"})
+    assert len(study.pareto()) == 6
+    line = study.plot_pareto().axes[0].lines[-1]
+    assert np.isnan(line.get_xdata()).sum() == 1
+    with pytest.raises(fx.InputError, match="needs two measures"):
+        fake_study(rows, {"a": "max"}).pareto()
+
+
+def test_a_study_on_a_dask_cluster(here, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as client:
+        found = run(client.get_executor(), folder=tmp_path / "study")
+    assert len(found.successful) == len(found.runs)

@@ -4,8 +4,13 @@ import html
 import itertools
 from typing import Any
 
+import numpy as np
+
 from ...figures import figure
 from ...results.show import page as pages
+
+_GAP = 3.0
+"""Distance of two runs of a Pareto front, over the median distance, above which no line is drawn between them."""
 
 
 def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measure: str,
@@ -45,7 +50,11 @@ def pareto(runs: list[Any], front: list[Any], a: str, b: str, labels: dict[str, 
     """
     drawing, axes = figure()
     axes.plot([run.measures[a] for run in runs], [run.measures[b] for run in runs], ".", color="0.75")
-    axes.plot([run.measures[a] for run in front], [run.measures[b] for run in front], "o-", color="C3")
+    points = np.array([(run.measures[a], run.measures[b]) for run in front])
+    spans = np.maximum(np.ptp([(run.measures[a], run.measures[b]) for run in runs], axis=0), 1e-300)
+    steps = np.hypot(*(np.diff(points, axis=0) / spans).T)
+    gaps = np.flatnonzero(steps > _GAP * (np.median(steps) if len(steps) else 0.0)) + 1
+    axes.plot(*np.insert(points, gaps, np.nan, axis=0).T, "o-", color="C3")
     axes.set(xlabel=labels[a], ylabel=labels[b])
     return drawing
 

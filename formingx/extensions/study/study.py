@@ -34,6 +34,7 @@ from ...results.files.column_table import ColumnTable
 from ...units import NONE, Units
 from ...values.tolerances import NEGLIGIBLE
 from . import effects, stored_runs
+from .response import Sensitivities, sobol
 from .task import Measure, StudyRun, Task, as_text, check_importable, completed_runs, executor_context
 from .variables import sets_of_values
 
@@ -78,21 +79,36 @@ class Study(ColumnTable):
             raise InputError("Study.best: the study has no goal" if not self.goal else "Study.best: all runs failed")
         return min(self.successful, key=self._cost)
 
-    def pareto(self, a: str, b: str) -> list[StudyRun]:
+    def _measures_of_goal(self, a: str | None, b: str | None) -> tuple[str, str]:
+        """Return the names of two measures; by default the first two of the goal.
+
+        Raises:
+            InputError: one measure alone is given, or none and the goal has fewer than two.
+        """
+        if a is not None and b is not None:
+            return a, b
+        if a is not None or b is not None or len(self.goal) < 2:
+            raise InputError(f"Study.pareto: needs two measures, pareto('a', 'b'), or a goal with two; the goal has"
+                             f" {', '.join(self.goal) or 'none'}, the study {', '.join(self.measures)}")
+        first, second = list(self.goal)[:2]
+        return first, second
+
+    def pareto(self, a: str | None = None, b: str | None = None) -> list[StudyRun]:
         """Return the runs that no other run beats in two measures, sorted by the first measure.
 
         A measure without a goal is best where it is largest.
 
         Args:
-            a: name of the first measure.
-            b: name of the second measure.
+            a: name of the first measure; default the first of the goal.
+            b: name of the second measure; default the second of the goal.
 
         Returns:
             The runs.
 
         Raises:
-            InputError: an unknown measure.
+            InputError: an unknown measure, or a goal with fewer than two.
         """
+        a, b = self._measures_of_goal(a, b)
         names = self._checked_measure(a), self._checked_measure(b)
         signs = {name: -1 if self.goal.get(name, "max") == "max" else 1 for name in names}
         points = [tuple(sign * run.measures[name] for name, sign in signs.items()) for run in self.successful]
@@ -138,18 +154,33 @@ class Study(ColumnTable):
         """
         return effects.main_effects(self.successful, self.effects(measure), measure, self._labels(units))
 
-    def plot_pareto(self, a: str, b: str, units: Units = NONE) -> Any:
-        """Draw two measures of all successful runs as dots, with the Pareto front as a line.
+    def plot_pareto(self, a: str | None = None, b: str | None = None, units: Units = NONE) -> Any:
+        """Draw two measures of all successful runs as dots, with the Pareto front as a line that ends at gaps.
 
         Args:
-            a: name of the first measure.
-            b: name of the second measure.
+            a: name of the first measure; default the first of the goal.
+            b: name of the second measure; default the second of the goal.
             units: units of the script, for the labels.
 
         Returns:
             The matplotlib figure.
         """
+        a, b = self._measures_of_goal(a, b)
         return effects.pareto(self.successful, self.pareto(a, b), a, b, self._labels(units))
+
+    def sensitivities(self, measure: str) -> Sensitivities:
+        """Return the Sobol indices of a measure: the parts of its variance that the variables cause, largest first.
+
+        They belong to a polynomial of second order that is fitted to the runs (`scipy.stats.sobol_indices`).
+
+        Args:
+            measure: name of the measure.
+
+        Raises:
+            InputError: an unknown measure, or too few runs.
+        """
+        self._checked_measure(measure)
+        return sobol(self.successful, self.variables, measure)
 
     def report(self, file: Any, title: str = "Study", units: Units = NONE,
                labels: Mapping[str, str] | None = None) -> None:
@@ -292,7 +323,8 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
         goal: {measure: "max" or "min"}; the first one defines the best run.
         folder: folder for the results of the runs. Runs stored there are not repeated, unless they failed by another
             error than a `ConvergenceError`.
-        executor: an executor of `concurrent.futures`, or `mpi4py.futures.MPIPoolExecutor`. Default: processes of this
+        executor: an executor of `concurrent.futures`, of Dask (`Client(...).get_executor()`) or of mpi4py
+            (`MPICommExecutor`). Default: processes of this
             machine. Functions run in other processes must be importable: no lambda, no function inside another.
         workers: number of parallel processes; default one per core.
         progress: True for a progress bar.
