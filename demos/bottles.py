@@ -1,6 +1,6 @@
 """Square bottle, parison and card that the demos of bottles in three dimensions share. Lengths in mm, stresses in MPa.
 
-The mould is 70 mm by 70 mm wide and 180 mm high: a body with vertical edges of radius 12 mm, a base with a fillet of 6
+The mould is 70 mm by 70 mm wide and 180 mm high: a body with vertical edges of radius 12 mm, a base with a fillet of 10
 mm, a shoulder from a height of 134 mm to 160 mm, and a round neck of radius 17 mm. The parison has a middle surface of
 radius 16 mm and a wall of 2.5 mm. The card of the material is invented: it relaxes like a polyethylene melt for blow
 moulding.
@@ -17,7 +17,7 @@ import formingx as fx
 from formingx import figures
 
 RADIUS, WALL, HEIGHT, HALF, EDGE, NECK = 16.0, 2.5, 180.0, 35.0, 12.0, 17.0
-SHOULDER, PROFILE_FILLETS = [(0.0, -16.0), (10.0, -16.0), (HALF, -46.0)], [0.0, 0.0, 12.0, 6.0, 0.0]
+SHOULDER, PROFILE_FILLETS = [(0.0, -16.0), (10.0, -16.0), (HALF, -46.0)], [0.0, 0.0, 12.0, 10.0, 0.0]
 MID_HEIGHT, DENSITY, HOLD = -HEIGHT / 2, 0.95, 0.6
 UNITS = fx.Units(length="mm", stress="MPa", time="s")
 CARD = fx.Viscoelastic(fx.NeoHookean(c10=0.004), [(0.08, 0.3), (0.03, 3.0)])                  # invented

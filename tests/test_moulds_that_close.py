@@ -99,6 +99,16 @@ def test_capacity_to_the_brim_and_to_a_fill_height():
         wall.capacity(5.0)
 
 
+def test_unrolled_wall_of_an_axisymmetric_part_depends_on_the_height_alone():
+    path = fx.trace(scene(thickness=lambda x, y, z: 1 - z / 100), until=fx.enclosed_volume(3e4), progress=False)
+    wall = path.wall()
+    found = wall.unrolled(angles=9, levels=12)
+    assert found["wall"].shape == (12, 9) and np.isfinite(found["wall"]).all()
+    assert found["angle"][[0, -1]] == pytest.approx([0, 90], abs=1e-9)
+    assert np.ptp(found["wall"], axis=1).max() < 0.05 and np.all(np.diff(found["wall"].mean(1))[2:] < 0)
+    assert found["wall"][6, 0] == pytest.approx(wall.section((0, 0, found["z"][6]), (0, 0, 1))["wall"][0], rel=0.02)
+
+
 @pytest.mark.thorough
 def test_halves_pinch_an_open_tube_flat():
     mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(30, 5), part="quarter")

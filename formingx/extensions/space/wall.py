@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, direction, finite, pair, positive, triple
+from ...errors import InputError, count, direction, finite, pair, positive, triple
 from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.edges import edges_of
 from ...mesh.nodes import cell_node_positions, own_cells, without_round_off
@@ -175,6 +175,41 @@ class SheetWall(ColumnTable):
         corners = points[triangles]
         area = np.linalg.norm(_normals(corners), axis=1)
         return self.images * (volume_within(points, triangles) - float(self.wall[owner] @ area))
+
+    def unrolled(self, angles: int = 36, levels: int = 40) -> dict[str, np.ndarray]:
+        """Return the wall of the modelled part on a grid of angle and height, such as the label side of a bottle.
+
+        Args:
+            angles: number of angles about the z axis, from the smallest to the largest angle of the nodes.
+            levels: number of heights, from the lowest to the highest node.
+
+        Returns:
+            {"angle": shape (angles,), degrees; "z": shape (levels,), length; "wall": shape (levels, angles), length,
+            nan where the plane of an angle does not meet the part at a height}. Where it meets the part more than
+            once, the outermost wall counts.
+
+        Raises:
+            InputError: fewer than two angles or heights.
+        """
+        if count("unrolled: angles", angles) < 2 or count("unrolled: levels", levels) < 2:
+            raise InputError("unrolled: angles and levels: must be at least two each")
+        x, z = self.deformed_points, self.deformed_points[:, 2]
+        turn = np.degrees(np.arctan2(x[:, 1], x[:, 0]))
+        off_axis = np.hypot(x[:, 0], x[:, 1]) > 1e-6 * np.ptp(x, axis=0).max()
+        at, heights = np.linspace(turn[off_axis].min(), turn[off_axis].max(), angles), np.linspace(
+            z.min(), z.max(), levels + 2)[1:-1]
+        found = np.full((levels, angles), np.nan)
+        for row, height in enumerate(heights):
+            cut = self.section((0, 0, height), (0, 0, 1))
+            angle, radius = np.degrees(np.arctan2(cut["y"], cut["x"])), np.hypot(cut["x"], cut["y"])
+            for column, value in enumerate(at):
+                a, b = (angle[:-1] - value + 180) % 360 - 180, (angle[1:] - value + 180) % 360 - 180
+                crossed = np.flatnonzero((a * b <= 0) & (np.abs(a - b) < 90) & (a != b))
+                if len(crossed):
+                    k = crossed[np.argmax(radius[crossed])]
+                    found[row, column] = np.interp(0.0, *zip(*sorted([(a[k], cut["wall"][k]),
+                                                                      (b[k], cut["wall"][k + 1])])))
+        return {"angle": at, "z": heights, "wall": found}
 
     def mean_ratio(self, point: tuple[float, float, float], radius: float) -> float:
         """Return the mean ratio of deformed to reference thickness around a point of the part.

@@ -1,0 +1,63 @@
+"""The demos of bottles in three dimensions, quick and in full, with their key numbers."""
+
+import json
+
+import pytest
+from conftest import drawn
+from test_demos import summary
+
+
+@pytest.mark.thorough
+def test_square_bottle_quick(tmp_path):
+    found = summary("square_bottle", tmp_path, "--quick")
+    bottle, strain = found["square_bottle"], found["square_bottle"]["plane_strain"]
+    assert bottle["weight_g"] == pytest.approx(40.7, abs=0.1) and bottle["capacity_ml"] == pytest.approx(653, abs=3)
+    assert bottle["middle_of_face_mm"]["mid_height"] == pytest.approx(strain["middle_of_face_mm"], rel=0.03)
+    assert bottle["edge_mm"]["mid_height"] == pytest.approx(strain["edge_mm"], rel=0.04)
+    assert bottle["least_wall_mm"] < strain["edge_mm"]
+
+
+@pytest.mark.slow
+def test_square_bottle(tmp_path):
+    found = summary("square_bottle", tmp_path)
+    bottle, strain = found["square_bottle"], found["square_bottle"]["plane_strain"]
+    assert bottle["edge_mm"]["mid_height"] == pytest.approx(strain["edge_mm"], rel=0.02)
+    assert bottle["middle_of_face_mm"]["mid_height"] == pytest.approx(strain["middle_of_face_mm"], rel=0.03)
+    assert found["round"]["least_wall_over_solid"] == pytest.approx(1, abs=0.015)
+    assert found["round"]["bands_largest_percent"] < 2.2
+    assert found["inflation"]["limit_pressure_R_over_mu_H"] == pytest.approx(0.91071, rel=1e-3)
+    assert found["inflation"]["limit_volume_over_first"] == pytest.approx(2.7368, rel=1e-3)
+    assert drawn(tmp_path / "square_bottle_3d.png")
+
+
+@pytest.mark.thorough
+def test_closing_halves_quick(tmp_path):
+    found = summary("closing_halves", tmp_path, "--quick")
+    assert found["pinch_half_width_over_R"] == pytest.approx(1.55, abs=0.02)                # pi/2 without stretch
+    assert found["bottle_share_of_weight"] == pytest.approx(180 / 210, rel=0.02)
+    assert 0.15 < found["least_wall_ratio"] < 0.25
+
+
+@pytest.mark.slow
+def test_closing_halves(tmp_path):
+    found = summary("closing_halves", tmp_path)
+    assert found["pinch_half_width_over_R"] == pytest.approx(1.55, abs=0.02)
+    assert found["bottle_share_of_weight"] == pytest.approx(180 / 210, rel=1e-3)
+    assert drawn(tmp_path / "closing_halves.png")
+
+
+@pytest.mark.thorough
+def test_stretch_blow_quick(tmp_path):
+    found = summary("stretch_blow", tmp_path, "--quick")
+    assert found["weight_g"] == pytest.approx(25.6, abs=0.1)
+    assert found["rod_force_largest_N"] == pytest.approx(606, rel=0.02)
+    assert found["least_wall_mm"] > 1.5 * found["without_rod"]["least_wall_mm"]
+
+
+@pytest.mark.slow
+def test_stretch_blow(tmp_path):
+    found = summary("stretch_blow", tmp_path)
+    assert found["least_wall_mm"] > 1.5 * found["without_rod"]["least_wall_mm"]
+    assert found["round"]["least_wall_over_solid"] == pytest.approx(1, abs=0.06)
+    assert drawn(tmp_path / "stretch_blow.png")
+    assert json.loads((tmp_path / "summary.json").read_text())["rod_force_largest_N"] > 500
