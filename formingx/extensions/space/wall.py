@@ -207,8 +207,8 @@ class SheetWall(ColumnTable):
                 crossed = np.flatnonzero((a * b <= 0) & (np.abs(a - b) < 90) & (a != b))
                 if len(crossed):
                     k = crossed[np.argmax(radius[crossed])]
-                    found[row, column] = np.interp(0.0, *zip(*sorted([(a[k], cut["wall"][k]),
-                                                                      (b[k], cut["wall"][k + 1])])))
+                    s = a[k] / (a[k] - b[k])
+                    found[row, column] = (1 - s) * cut["wall"][k] + s * cut["wall"][k + 1]
         return {"angle": at, "z": heights, "wall": found}
 
     def mean_ratio(self, point: tuple[float, float, float], radius: float) -> float:
