@@ -245,12 +245,12 @@ class Vertices(_Nodes):
         self.points = self.nodes = vectors.tabulate_dof_coordinates()[own].copy()
         self.area = self.lumped = self.extent = assemble(surface.compile(surface.area_row()))[self.dofs[:, 0]]
         self.lengths = np.sqrt(self.area)
-        self._surface, self._assemble = surface, assemble
+        self.surface, self._assemble = surface, assemble
 
     @cached_property
     def _deformed_area(self) -> Any:
         """Compiled linear form whose entries are the deformed tributary areas of the nodes."""
-        return self._surface.compile(self._surface.area_row(deformed=True))
+        return self.surface.compile(self.surface.area_row(deformed=True))
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
         """Return the deformed area of the triangles around each node over their reference area, shape (n,); collective.
@@ -261,7 +261,7 @@ class Vertices(_Nodes):
         Returns:
             Area ratio, shape (n,).
         """
-        w = self._surface.w.x
+        w = self.surface.w.x
         before = w.array.copy()
         w.array[: len(fields)] = fields
         w.scatter_forward()

@@ -7,6 +7,7 @@ accepted state.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from ...contact.approach import LIMITS, Approach, StepRejection
 from ...contact.face import FaceContact
 from ...physics.contact_law import ContactHistory
 from ...ranks import combined
+from .passed_tools import PassedPoint, PassedTool
 
 
 @dataclass(frozen=True)
@@ -38,6 +40,8 @@ class LaggedLimits:
         max_solutions: largest number of solutions of a step. After each of them points separate or come into contact.
         min_force: normal force, over shear modulus times thickness times length, that is added to the denominator of
             relative changes of the pressure: lightly loaded contacts do not limit the step.
+        max_passed_ratio: largest distance by which a point of the tool may have passed a triangle, over the longest
+            edge of the triangle. A triangle that bridges a sharp edge cuts off up to 0.35 of its edge.
     """
 
     max_approach_ratio: float = 0.7
@@ -49,6 +53,7 @@ class LaggedLimits:
     settling_iterations: int = 2
     max_solutions: int = 30
     min_force: float = 1e-2
+    max_passed_ratio: float = 0.4
 
 
 LAGGED = LaggedLimits()
@@ -65,6 +70,7 @@ class LaggedApproach(Approach):
     def __init__(self, face: FaceContact, conducts: bool):
         super().__init__(face, conducts)
         self.max_closures *= max(self.points // 100, 1)
+        self._last: tuple[np.ndarray, float, PassedPoint | None] | None = None        # result of `passed`, and where
 
     def _within_motion(self, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> float:
         most = LAGGED.max_approach_ratio * np.maximum(-self.face.law.distance(start), 0.0) + self.face.rule.lengths
@@ -98,7 +104,56 @@ class LaggedApproach(Approach):
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
         return False                                        # points open and close between steps only
 
+    def _jumps_over(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """Return True if an open point that does not stick enters the tool in a step, up to its other side.
+
+        A point that sticks is held where it entered. Another one would be pushed out where it is nearest to the
+        surface, which must be the side on which it entered. old, old_control, new, control: locally owned unknowns and
+        load parameter at the start of the step and at its end.
+        """
+        face, law = self.face, self.face.law
+        if face.contact.sticks or face.history is None:
+            return False
+        a, b = face.positions(old, old_control), face.positions(new, control)
+        free = face.history.distance <= -law.theta
+        rows = np.flatnonzero(free & np.isfinite(law.entries(a, b, law.distance(b) > -law.theta)))
+        found = False
+        if len(rows):
+            sides = (law.tool.distances(x[rows]).normal for x in (a, b))
+            found = bool((np.einsum("ni,ni->n", *sides) < 0).any())
+        return bool(combined(self._comm, found, MPI.LOR))
+
+    @cached_property
+    def _passed_tool(self) -> PassedTool | None:
+        """Test for parts of the tool on the wrong side of the sheet; None for a sheet that is not flat at first."""
+        return PassedTool(self.face) if self.face.rule.surface.scene.mesh.flat else None
+
+    def passed(self, fields: np.ndarray, control: float) -> PassedPoint | None:
+        """Return the point of the tool that passed the sheet farthest, or None if it passed less than is resolved.
+
+        Args:
+            fields: locally owned unknowns of the state, shape (n,).
+            control: load parameter (control) of the state, dimensionless.
+        """
+        if self._last is None or self._last[1] != control or not np.array_equal(self._last[0], fields):
+            test = self._passed_tool
+            found = test.deepest(fields, control, LAGGED.max_passed_ratio) if test else None
+            self._last = fields.copy(), control, found
+        found = self._last[2]
+        return found if found is not None and found.ratio > LAGGED.max_passed_ratio else None
+
+    def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        return (super().passes_through(old, old_control, new, control) or self._jumps_over(
+            old, old_control, new, control) or self.passed(new, control) is not None)
+
     def rejection(self, old: Any, new: Any, n: int, length: float, ends: bool) -> StepRejection | None:
+        if self._jumps_over(old.x[:n], old.control, new.x[:n], new.control):
+            return StepRejection("a point passes through a thin part of its tool")
+        passed = self.passed(new.x[:n], new.control)
+        if passed is not None:
+            return StepRejection(f"the tool of {self.face.contact.label!r} passes through the sheet at (x, y, z) ="
+                                 f" ({', '.join(f'{v:.3g}' for v in passed.place)}), where a triangle is"
+                                 f" {passed.depth:.2g} beyond it: smaller triangles are needed there")
         found = super().rejection(old, new, n, length, ends)
         if found is not None or not length > LIMITS.min_length:
             return found
@@ -141,7 +196,7 @@ class LaggedApproach(Approach):
         return (sweep < LAGGED.max_corrections and self.update_pressure(fields, control)) | late
 
     def _close_penetrated(self, fields: np.ndarray, control: float) -> bool:
-        """Close the gaps of open points that are deeper in the tool than is negligible; collective.
+        """Close the gaps of open points that penetrate the tool more than is negligible; collective.
 
         Each such point sticks or slides from the position where its path in the step met the tool. Return True if
         there are such points. fields, control: locally owned unknowns and load parameter of the state.
@@ -150,7 +205,10 @@ class LaggedApproach(Approach):
         if variables is None:
             return False
         old, x, theta = variables.history, face.positions(fields, control), face.law.theta
-        late = (old.distance <= -theta) & (face.law.distance(x) > LIMITS.negligible_gap * face.thickness)
+        late = face.law.distance(x) > LIMITS.negligible_gap * face.thickness
+        if face.law.sticks:                                 # also behind a thin part of the tool
+            late = np.isfinite(face.law.entries(old.position, x, late))
+        late &= old.distance <= -theta
         found = bool(combined(self._comm, int(late.sum()), MPI.SUM))
         if found:
             new = face.law.tractions(x, old).history

@@ -30,6 +30,8 @@ _TENSILE_DISTANCE = 0.01
 A point that is sheared along a facet leaves the tool at the edges of the facet, without tension.
 """
 
+_ADVANCES = 200            # steps along a path up to the tool, each as long as the distance from it
+
 _BISECTIONS = math.ceil(-math.log2(ROUND_OFF))
 """Bisections of a chord down to the point where it crosses a tool."""
 
@@ -118,6 +120,45 @@ class LaggedStick(ContactLaw):
             self._found = [(x.copy(), found), *self._found[:2]]
         return found
 
+    def entries(self, a: np.ndarray, b: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        """Return where straight paths enter the tool, as shares of the paths, shape (n,); inf for paths outside it.
+
+        The distance from the tool is a safe advance along a path, so no thin part of the tool is passed over.
+
+        Args:
+            a: positions at the start, outside the tool, shape (n, 3), length.
+            b: positions at the end, shape (n, 3), length.
+            ends: mask of the paths that end in the tool or on it, shape (n,).
+        """
+        found: np.ndarray = np.where(ends, 1.0, np.inf)
+        low: np.ndarray
+        high: np.ndarray
+        active: np.ndarray
+        length = np.linalg.norm(b - a, axis=1)
+        rows = np.flatnonzero((ends | (length > -self.distance(a) - self.distance(b))) & (length > 0))
+        if not len(rows):
+            return found
+        a, way, length = a[rows], (b - a)[rows], length[rows]
+        low, high, active = np.zeros(len(rows)), np.full(len(rows), np.inf), np.ones(len(rows), dtype=bool)
+        for _ in range(_ADVANCES):
+            d = self.tool.signed_distance(a + low[:, None] * way)
+            inside = active & (d > 0)
+            high[inside] = low[inside]
+            active &= ~inside & (low < 1)
+            if not active.any():
+                break
+            step = np.maximum(-d, self.theta) / length
+            low = np.where(active, np.minimum(low + step, 1.0), low)
+        low = np.where(np.isfinite(high), np.maximum(high - self.theta / length, 0.0), 0.0)
+        high = np.where(np.isfinite(high), high, np.where(ends[rows], 1.0, np.inf))
+        hit = np.flatnonzero(np.isfinite(high))
+        for _ in range(_BISECTIONS):
+            middle = (low[hit] + high[hit]) / 2
+            inside = self.tool.signed_distance(a[hit] + middle[:, None] * way[hit]) > 0
+            low[hit], high[hit] = np.where(inside, low[hit], middle), np.where(inside, middle, high[hit])
+        found[rows] = high
+        return found
+
     def start(self, x: np.ndarray) -> ContactHistory:
         """Return the history variables of points at the start of a run; points inside the tool stick where they are.
 
@@ -169,17 +210,9 @@ class LaggedStick(ContactLaw):
             sticking: mask of the points that stick already, shape (n,).
         """
         d = self.distance(x)
-        new = ~sticking & (d > -self.theta)
+        share = np.where(sticking, np.inf, self.entries(old.position, x, d > -self.theta))
+        new = np.isfinite(share)
         position = np.where(sticking[:, None], old.position, x)
-        rows = np.flatnonzero(new)
-        if len(rows):
-            a, b = old.position[rows], x[rows]
-            low: np.ndarray = np.zeros(len(rows))
-            high: np.ndarray = np.ones(len(rows))
-            for _ in range(_BISECTIONS):
-                middle = (low + high) / 2
-                inside = self.tool.signed_distance(a + middle[:, None] * (b - a)) > 0
-                low, high = np.where(inside, low, middle), np.where(inside, middle, high)
-            position[rows] = a + high[:, None] * (b - a)
+        position[new] = old.position[new] + share[new, None] * (x - old.position)[new]
         free = np.minimum(d, -2 * self.theta)
         return ContactHistory(position, np.where(sticking | new, 0.0, free), np.zeros(len(x)), x.copy())

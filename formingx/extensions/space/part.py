@@ -12,6 +12,7 @@ from ...results.files.column_table import ColumnTable
 from ...results.numbers import PartNumbers
 from ...scene.symmetry import MirrorPlanes
 from ...units import NONE, Units
+from .sheet import chords, outline_edges
 from .union import Union
 from .wall import SheetWall
 
@@ -74,8 +75,8 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
     Args:
         wall: wall of the sheet in the state.
         density: density in g/cm3, or None.
-        trim: z of the plane at which the formed sheet is cut, length; the part is the side away from the flat sheet.
-            None: no cut.
+        trim: z of the plane at which the formed sheet is cut, length; the part is the side away from the flat sheet. Or
+            an outline in the plane of x and y, as that of `fx.mesh.sheet`; the part is inside it. None: no cut.
         heights: must be empty, since `SheetWall.section` gives the wall along a cut.
         units: units of the labels.
         planes: mirror planes at which the modelled body ends.
@@ -84,17 +85,12 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
         Numbers of the whole part.
 
     Raises:
-        InputError: heights are given, the plane of `trim` does not meet the part, or the density is not positive.
+        InputError: heights are given, the plane or outline of `trim` does not meet the part, or the density is not
+            positive.
     """
     if len(tuple(heights)):
         raise InputError("part: heights: in three dimensions use path.wall().section(point, normal)")
-    share = np.ones(len(wall.wall))
-    if trim is not None:
-        level, z = finite("part: trim", trim), wall.deformed_points[:, 2]
-        if not z.min() < level < z.max():
-            raise InputError(f"part: trim = {trim!r}: must be a z that the part passes: it goes from {z.min():.6g} to"
-                             f" {z.max():.6g}")
-        share = _positive_share((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
+    share = np.ones(len(wall.wall)) if trim is None else _trimmed_share(wall, trim)
     kept = share > 0
     h, area, rest = wall.wall[kept], (wall.area * share)[kept], (wall.reference_area * share)[kept]
     volume, images = float((h * area).sum()), planes.factor
@@ -108,6 +104,50 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
                      float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
                      weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()),
                      planes.basis(None), units, None if wall.flat else wall.capacity())
+
+
+def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
+    """Return the share of the area of each triangle that remains after trimming, shape (m,).
+
+    Args:
+        wall: wall of the sheet.
+        trim: z of a plane, length, or an outline in the plane of x and y.
+
+    Raises:
+        InputError: the plane or the outline does not meet the part.
+    """
+    points = wall.deformed_points
+    if not isinstance(trim, list | tuple | np.ndarray):
+        level, z = finite("part: trim", trim), points[:, 2]
+        if not z.min() < level < z.max():
+            raise InputError(f"part: trim = {trim!r}: must be a z that the part passes: it goes from {z.min():.6g} to"
+                             f" {z.max():.6g}; or an outline, such as fx.mesh.rectangle(...)")
+        return _positive_share((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
+    corners = chords(outline_edges(trim, "part: trim"), "part: trim")
+    inside = _depth_in_polygon(points[:, :COORDINATES], corners)
+    if inside.max() <= 0:
+        (x_min, y_min), (x_max, y_max) = corners.min(0), corners.max(0)
+        raise InputError(f"part: trim: the outline, with x from {x_min:.6g} to {x_max:.6g} and y from {y_min:.6g} to"
+                         f" {y_max:.6g}, does not contain any node of the part")
+    return _positive_share(inside[wall.triangles])
+
+
+def _depth_in_polygon(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
+    """Return the distances of points from the boundary of a polygon, positive inside, shape (n,), length.
+
+    Args:
+        points: positions (x, y), shape (n, 2), length.
+        corners: corners of the polygon, shape (k, 2), length.
+    """
+    inside, nearest = np.zeros(len(points), dtype=bool), np.full(len(points), np.inf)
+    for a, b in zip(corners, np.roll(corners, -1, axis=0)):
+        off, way = points - a, b - a
+        along = np.clip(off @ way / (way @ way), 0, 1)
+        nearest = np.minimum(nearest, np.linalg.norm(off - along[:, None] * way, axis=1))
+        crossed = (a[1] > points[:, 1]) != (b[1] > points[:, 1])          # a ray along x, of odd number from inside
+        with np.errstate(divide="ignore", invalid="ignore"):
+            inside ^= crossed & (off[:, 0] < way[0] * off[:, 1] / way[1])
+    return np.where(inside, nearest, -nearest)
 
 
 def _positive_share(d: np.ndarray) -> np.ndarray:
@@ -176,9 +216,9 @@ def filling(path: Any, contact: Any) -> SheetFilling:
             x = contact.positions(fields, state.control)
             d = tool.signed_distance(x)
             closed = contact.touching(fields, state.control) | (d > -0.1 * contact.thickness)
-            forces: Any = contact.area[:, None] * contact.tractions(fields, state.control).force if names else None
+            forces = contact.area[:, None] * contact.tractions(fields, state.control).force
         area = contact.rule.area
-        nearest = tool.nearest_parts(x) if names else None
+        nearest = tool.nearest_parts(x) if names else np.zeros(len(x), dtype=int)
         shares = [np.append(area[closed & (nearest == k)].sum(), forces[nearest == k].sum(0))
                   for k in range(len(names))]
         parts = comm.allgather((np.array([area[closed].sum(), area.sum(), *np.ravel(shares)]),

@@ -13,6 +13,7 @@ from ...mesh.nodes import SAME_PLACE, arguments
 from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode, Symmetry
 from ...ranks import gathered
+from ...values.tolerances import NEGLIGIBLE
 from .surface_mesh import SurfaceMesh
 
 _EXTENT_RATIO = 9.0
@@ -185,7 +186,8 @@ def check_contact(scene: Any, contact: Any) -> None:
     depth = tool.signed_distance(points)
     k = int(np.argmax(depth))
     finite(f"{contact!r}: distance to the tool", float(depth[k]))
-    if depth[k] > 1e-6 * length:
+    h = sum(float(thickness(*points[k:k + 1].T)[0]) for thickness in scene.thickness.values())
+    if depth[k] > max(1e-6 * length, NEGLIGIBLE * h):
         place = ", ".join(f"{v:.6g}" for v in points[k])
         raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = ({place}):"
                          f" move the tool (moved), or is the solid of its profile on the other side (Tool.reversed())?")

@@ -141,12 +141,7 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     layers: sheet
     boundaries: rim, x0, bottom, top
     """
-    edges = as_list("sheet: outline", outline, "corners (x, y), or what fx.mesh.rectangle gives")
-    if not all(isinstance(edge, Edge) for edge in edges):
-        corners = [pair("sheet: outline: corner", point) for point in edges]
-        if len(corners) < 3:
-            raise InputError(f"sheet: outline = {outline!r}: must have at least three corners")
-        edges = [Edge(a, b, None, "rim") for a, b in zip(corners, [*corners[1:], corners[0]])]
+    edges = outline_edges(outline, "sheet: outline")
     if names is not None:
         called = as_list("sheet: names", names, "words")
         if len(called) != len(edges):
@@ -155,7 +150,7 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
     for edge in edges:
         if check_type("sheet: names: name", edge.name, str, "a word") in ("bottom", "top", ""):
             raise InputError(f"sheet: names: name = {edge.name!r}: must be a word, not that of a face")
-    x = _chords(edges)
+    x = chords(edges, "sheet: outline")
     edge_length = _Size(size)
     areas, sizes = edge_length.area_and_size(x)
     lines = as_list("sheet: reflected", reflected, "names")
@@ -169,10 +164,31 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
                         words, of_size=lambda size: sheet(edges, size, layers=words, reflected=lines, comm=comm))
 
 
-def _chords(edges: list[Edge]) -> np.ndarray:
+def outline_edges(outline: Any, caller: str) -> list[Edge]:
+    """Return the pieces of an outline that is given by pieces or by the corners (x, y) of a polygon.
+
+    Args:
+        outline: pieces, as those of `rectangle`, or corners, length.
+        caller: name of the caller and of its argument, for messages.
+
+    Raises:
+        InputError: it is neither, or has fewer than three corners.
+    """
+    edges = as_list(caller, outline, "corners (x, y), or what fx.mesh.rectangle gives")
+    if all(isinstance(edge, Edge) for edge in edges):
+        return edges
+    corners = [pair(f"{caller}: corner", point) for point in edges]
+    if len(corners) < 3:
+        raise InputError(f"{caller} = {outline!r}: must have at least three corners")
+    return [Edge(a, b, None, "rim") for a, b in zip(corners, [*corners[1:], corners[0]])]
+
+
+def chords(edges: list[Edge], caller: str) -> np.ndarray:
     """Return the corners of an outline with each arc divided into 8 chords, shape (n, 2), length.
 
-    edges: straight and curved pieces of the outline, in order.
+    Args:
+        edges: straight and curved pieces of the outline, in order.
+        caller: name of the caller and of its argument, for messages.
 
     Raises:
         InputError: two equal corners in succession, or an outline that crosses or touches itself, for which gmsh might
@@ -182,7 +198,7 @@ def _chords(edges: list[Edge]) -> np.ndarray:
     for edge in edges:
         a, b = np.array(edge.start), np.array(edge.end)
         if not np.any(a != b):
-            raise InputError(f"sheet: outline: the corner ({a[0]:.6g}, {a[1]:.6g}) is there twice, one after the other")
+            raise InputError(f"{caller}: the corner ({a[0]:.6g}, {a[1]:.6g}) is there twice, one after the other")
         line = a + np.linspace(0, 1, 2 if edge.centre is None else 9)[:-1, None] * (b - a)
         if edge.centre is not None:
             away = line - edge.centre
@@ -190,7 +206,7 @@ def _chords(edges: list[Edge]) -> np.ndarray:
         points.append(line)
     x = np.concatenate(points)
     if (place := crossing_point(x, np.column_stack([np.arange(len(x)), np.roll(np.arange(len(x)), -1)]))) is not None:
-        raise InputError(f"sheet: outline: crosses or touches itself near ({place[0]:.6g}, {place[1]:.6g})")
+        raise InputError(f"{caller}: crosses or touches itself near ({place[0]:.6g}, {place[1]:.6g})")
     return x
 
 

@@ -1,0 +1,87 @@
+"""Points on the wrong side of a sheet, found in C.
+
+A ray from a point along z crosses the triangles of the sheet. The sum of the signs of the crossings says on which side
+of the sheet the point is. The function is compiled once, into the cache folder of compiled forms.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..._jit import functions
+from .compiled_patches import TRIANGLE
+
+_HEADER = """
+void crossings(long, const double *, long, const double *, const long *, const long *, const long *, double,
+               double, double, long, long, long *, long *, long *);
+void distances(long, const double *, long, const double *, const long *, double *, double *);
+"""
+
+_SOURCE = TRIANGLE + r"""
+static long cell(double x, double low, double size, long n)
+{
+    double k = floor((x - low) / size);
+    return k < 0 ? 0 : k >= n ? n - 1 : (long) k;
+}
+
+/* n points x (n, 3), sorted into cells of a grid of nx by ny squares of a size from (low_x, low_y): `first` (nx ny + 1)
+   and `order` (n). m triangles (m, 3) with corners P. For each point: the sum of signs of the triangles above it, that
+   of all on its ray along z, and their number */
+void crossings(long n, const double *x, long m, const double *P, const long *triangles, const long *first,
+               const long *order, double low_x, double low_y, double size, long nx, long ny, long *above, long *all,
+               long *number)
+{
+    for (long k = 0; k < n; k++) above[k] = all[k] = number[k] = 0;
+    for (long t = 0; t < m; t++) {
+        const long *corner = triangles + 3 * t;
+        const double *a = P + 3 * corner[0], *b = P + 3 * corner[1], *c = P + 3 * corner[2];
+        double nz = (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+        if (nz == 0) continue;
+        long i0 = cell(fmin(a[0], fmin(b[0], c[0])), low_x, size, nx), i1 = cell(fmax(a[0], fmax(b[0], c[0])), low_x,
+                                                                                  size, nx);
+        long j0 = cell(fmin(a[1], fmin(b[1], c[1])), low_y, size, ny), j1 = cell(fmax(a[1], fmax(b[1], c[1])), low_y,
+                                                                                  size, ny);
+        for (long i = i0; i <= i1; i++)
+            for (long j = j0; j <= j1; j++)
+                for (long q = first[i * ny + j]; q < first[i * ny + j + 1]; q++) {
+                    long k = order[q];
+                    const double *p = x + 3 * k;
+                    double e0 = (b[0] - p[0]) * (c[1] - p[1]) - (b[1] - p[1]) * (c[0] - p[0]);
+                    double e1 = (c[0] - p[0]) * (a[1] - p[1]) - (c[1] - p[1]) * (a[0] - p[0]);
+                    double e2 = nz - e0 - e1;
+                    int s = nz > 0 ? 1 : -1;
+                    if (s * e0 < 0 || s * e1 < 0 || s * e2 < 0) continue;
+                    double z = (e0 * a[2] + e1 * b[2] + e2 * c[2]) / nz;
+                    all[k] += s;
+                    number[k]++;
+                    if (z > p[2]) above[k] += s;
+                }
+    }
+}
+
+/* distance of n points x (n, 3) from the nearest of m triangles (m, 3) with corners P, and its longest edge */
+void distances(long n, const double *x, long m, const double *P, const long *triangles, double *distance,
+               double *longest)
+{
+    for (long k = 0; k < n; k++) {
+        double best = 1e300, r[3];
+        for (long t = 0; t < m; t++) {
+            const double *c[3], *p = x + 3 * k;
+            double u, v, y[3];
+            for (int i = 0; i < 3; i++) c[i] = P + 3 * triangles[3 * t + i];
+            flat(c[0], c[1], c[2], p, &u, &v);
+            for (int i = 0; i < 3; i++) y[i] = u * c[0][i] + v * c[1][i] + (1 - u - v) * c[2][i];
+            double f = away(y, p, r);
+            if (f >= best) continue;
+            best = f;
+            longest[k] = sqrt(fmax(away(c[0], c[1], r), fmax(away(c[1], c[2], r), away(c[2], c[0], r))));
+        }
+        distance[k] = sqrt(best);
+    }
+}
+"""
+
+
+def compiled() -> Any:
+    """Return the functions in C, compiled at the first call."""
+    return functions("crossings", _HEADER, _SOURCE)

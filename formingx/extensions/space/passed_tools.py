@@ -1,0 +1,180 @@
+"""Parts of tools that passed through a sheet in three dimensions, between its nodes or with them.
+
+Contact acts at the nodes of the sheet. A pin that is narrower than the triangles meets no node, and in a long step the
+nodes pass a thin floor. So points on the surface of the tool are compared with the triangles of the sheet: each must be
+on the side of the sheet that its contact names.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..._jit import address, address_of_integers
+from ...mesh.edges import edges_of
+from ...mesh.nodes import SAME_PLACE, nearest, own_cells
+from ...ranks import gathered
+from .compiled_crossings import compiled
+
+_SPACING = 0.35            # of the points on a tool, over the median edge of the triangles of the sheet
+_MOST_POINTS = 20_000      # on the surface of one tool
+_OFFSET = np.array([1.3e-6, 0.7e-6, 0.0])
+"""Shift of the points in the plane, over the median edge of the triangles of the sheet."""
+
+_MOST_COMPARED = 200       # of points on the wrong side, with all triangles
+_OFF_SURFACE = 0.5         # distance of a point from the tool's surface, over the spacing, above which it is hidden
+_MARGIN = 0.2              # of the points round the sheet, over its extent
+
+
+class PassedPoint(NamedTuple):
+    """Point of a tool that lies on the wrong side of the sheet.
+
+    Attributes:
+        ratio: its distance from the nearest triangle, over the longest edge of this triangle.
+        depth: this distance, length.
+        place: position (x, y, z), shape (3,), length.
+    """
+
+    ratio: float
+    depth: float
+    place: np.ndarray
+
+
+class PassedTool:
+    """Test of one contact for parts of its tool on the wrong side of the sheet.
+
+    The sheet was flat, in the plane z = 0. Where it is held, the plane continues it. A point of the tool is below this
+    surface if a ray along z crosses it once more upwards than downwards above the point.
+
+    Args:
+        face: the `FaceContact`.
+    """
+
+    def __init__(self, face: Any):
+        self._face = face
+        surface = face.rule.surface
+        vectors, numbers = surface.space.sub(0).collapse()
+        own = own_cells(surface.domain)
+        dofs, index = vectors.dofmap.list[own], vectors.dofmap.index_map
+        cells = index.local_to_global(np.ascontiguousarray(dofs.ravel(), dtype=np.int32)).reshape(-1, 3)
+        nodes = np.arange(len(face.points), dtype=np.int32)
+        place = np.full(index.size_local + index.num_ghosts, -1)
+        node_of = {int(dof): k for k, dof in enumerate(np.asarray(numbers).reshape(-1, 3)[:, 0])}
+        place[nodes] = [node_of[int(dof)] for dof in face.rule.dofs[:, 0]]
+        self._order = gathered(face.comm, index.local_to_global(place[nodes].astype(np.int32)))
+        self._cells = gathered(face.comm, cells)
+        X = self._placed(face.points)
+        corners = X[self._cells]
+        turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] < 0
+        self._cells[turned] = self._cells[turned][:, ::-1]
+        edges = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2)
+        self._size = float(np.median(edges))
+        way = face.contact.travel_vector
+        margin = (1.0 if way[0] or way[1] else _MARGIN) * np.ptp(X, axis=0).max()
+        self._points = surface_points(face.contact.tool, _SPACING * self._size, X, margin)
+        self._points += self._size * _OFFSET                  # off the edges of triangles, which a ray must not hit
+        self._edge = _outer_nodes(self._cells, X, surface.scene.symmetry.planes)
+
+    def deepest(self, fields: np.ndarray, control: float, negligible: float) -> PassedPoint | None:
+        """Return the point of the tool that passed the sheet farthest, or None; collective.
+
+        Args:
+            fields: locally owned unknowns of the state, shape (n,).
+            control: load parameter (control) of the state, dimensionless.
+            negligible: distance from the nearest node, over the median edge, up to which a point is not examined.
+        """
+        face, x = self._face, self._points
+        P = self._placed(face.positions(fields, control))
+        low, high = P[:, :2].min(0), P[:, :2].max(0)
+        x = x[((x[:, :2] >= low) & (x[:, :2] <= high)).all(1)]
+        if not len(x):
+            return None
+        n = np.maximum(np.ceil((high - low) / self._size), 1).astype(int)
+        cell = np.minimum(((x[:, :2] - low) / self._size).astype(int), n - 1) @ [n[1], 1]
+        first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=n[0] * n[1]))])
+        above, total, number = (np.zeros(len(x), dtype=int) for _ in range(3))
+        triangles = address_of_integers(self._cells)
+        compiled().crossings(
+            len(x), address(x), len(self._cells), address(P), triangles, address_of_integers(first),
+            address_of_integers(np.argsort(cell, kind="stable")), low[0], low[1], self._size, n[0], n[1],
+            address_of_integers(above), address_of_integers(total), address_of_integers(number))
+        shift = face.tool_displacement(control)
+        below = above + ((total == 0) & (x[:, 2] + shift[2] < 0)) > 0
+        wrong = np.flatnonzero((number > 0) & (below == (face.contact.on == "top")))
+        if len(wrong):                                        # at its edge, the sheet is not continued by the plane
+            wrong = wrong[nearest(P[self._edge], x[wrong])[0] > self._size]
+        if len(wrong):
+            wrong = wrong[nearest(P, x[wrong])[0] > negligible * self._size]
+        if not len(wrong):
+            return None
+        wrong = wrong[:: max(len(wrong) // _MOST_COMPARED, 1)]
+        depth, longest = np.zeros(len(wrong)), np.zeros(len(wrong))
+        x = np.ascontiguousarray(x[wrong])
+        compiled().distances(len(x), address(x), len(self._cells), address(P), triangles, address(depth),
+                             address(longest))
+        k = int(np.argmax(depth / longest))
+        return PassedPoint(float(depth[k] / longest[k]), float(depth[k]), x[k] + shift)
+
+    def _placed(self, positions: np.ndarray) -> np.ndarray:
+        """Return the positions of all nodes in the order of `_cells`, shape (n, 3), for those of this rank."""
+        found = np.empty((len(self._order), 3))
+        found[self._order] = gathered(self._face.comm, positions)
+        return found
+
+
+def _outer_nodes(cells: np.ndarray, X: np.ndarray, planes: tuple[Any, ...]) -> np.ndarray:
+    """Return the nodes at the edge of a sheet without its cuts at planes of symmetry, shape (k,).
+
+    Args:
+        cells: node numbers of the triangles, shape (m, 3).
+        X: reference positions of the nodes, shape (n, 3), length.
+        planes: mirror planes.
+    """
+    _, edges, _, times = edges_of(cells)
+    outer = edges[times == 1]
+    for plane in planes:
+        off = np.abs(X[outer, plane.axis] - plane.position).max(1)
+        outer = outer[off > SAME_PLACE * np.ptp(X, axis=0).max()]
+    return np.unique(outer)
+
+
+def surface_points(tool: Any, spacing: float, nodes: np.ndarray, margin: float) -> np.ndarray:
+    """Return points on the surface of a tool over the sheet, shape (n, 3), length.
+
+    Triangles of the drawn surface are divided to the spacing, and the points are moved onto the tool. Points that lie
+    inside another part of the tool are left out.
+
+    Args:
+        tool: the tool, with `distances` and `surface`.
+        spacing: largest distance of neighbouring points, length.
+        nodes: positions of the nodes of the flat sheet, shape (m, 3), length.
+        margin: width of the strip round the sheet in which points are found, too, length.
+    """
+    points, triangles = tool.surface()
+    low, high = nodes[:, :2].min(0) - margin, nodes[:, :2].max(0) + margin
+    corners = points[triangles]
+    over = (corners[..., :2].max(1) >= low).all(1) & (corners[..., :2].min(1) <= high).all(1)
+    corners = corners[over]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
+    edges = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2)
+    spacing = max(spacing, float(np.sqrt(area.sum() / _MOST_POINTS)))
+    found, rng = [corners.reshape(-1, 3)], np.random.default_rng(0)
+    count = np.ceil(area / spacing**2).astype(int)
+    rows = np.repeat(np.arange(len(corners)), count)
+    u = np.sort(rng.uniform(size=(len(rows), 2)), axis=1)
+    weights = np.column_stack([u[:, 0], u[:, 1] - u[:, 0], 1 - u[:, 1]])
+    found.append(np.einsum("nk,nki->ni", weights, corners[rows]))
+    for k in range(3):                                        # on long edges
+        pieces = np.ceil(edges[:, k] / spacing).astype(int)
+        rows = np.repeat(np.arange(len(corners)), np.maximum(pieces - 1, 0))
+        place = np.arange(len(rows)) - np.repeat(np.cumsum(pieces - 1) - (pieces - 1), np.maximum(pieces - 1, 0)) + 1
+        share = (place / pieces[rows])[:, None]
+        found.append((1 - share) * corners[rows, k - 1] + share * corners[rows, k])
+    x = np.concatenate(found)
+    x = x[((x[:, :2] >= low) & (x[:, :2] <= high)).all(1)]
+    x = x[np.unique(np.round(x / (spacing / 2)), axis=0, return_index=True)[1]]
+    near = tool.distances(x)
+    on = np.abs(near.distance) < _OFF_SURFACE * spacing
+    x = x[on] - (near.distance[:, None] * near.normal)[on]
+    return np.ascontiguousarray(x)

@@ -1,0 +1,97 @@
+"""No tool passes through a sheet in three dimensions: neither between its nodes, nor through them in a long step."""
+
+from time import process_time
+
+import numpy as np
+import pytest
+
+import formingx as fx
+from formingx.extensions.space.lagged_steps import LaggedApproach
+from formingx.extensions.space.passed_tools import surface_points
+
+MATERIAL = fx.NeoHookean(c10=1.0)
+HELD = [fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")]
+WRINKLES = fx.Membrane(wrinkles=0.01)
+
+
+def pushed(tool, friction, size=7.0, travel=25.0):
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(100.0, 80.0), size=size)
+    scene = fx.Scene(mesh=sheet, thickness=1.0, materials=MATERIAL, supports=[fx.Clamped("rim")], model=WRINKLES,
+                     contacts=[fx.Contact("top", tool, friction, direction=(0, 0, -1), name="pin")])
+    try:
+        return fx.trace(scene, until=fx.travel(travel), progress=False), ""
+    except fx.ConvergenceError as error:
+        return error.path, str(error)
+
+
+def pin(half):
+    return fx.tools.revolved(fx.Tool([(0.0, 0.0), (half, 0.0), (half, 30.0)])).moved(x=2.3, y=1.7, z=0.5)
+
+
+def blade(half):
+    profile = fx.Tool([(-half, 30.0), (-half, 0.0), (half, 0.0), (half, 30.0)])
+    return fx.tools.extruded(profile).moved(x=2.4, z=0.5)
+
+
+@pytest.mark.parametrize("make, half, friction", [(pin, 1.6, "stick"), (pin, 4.5, 0.2), (blade, 1.4, "none")])
+def test_pin_that_is_narrower_than_the_triangles_ends_the_run(make, half, friction):
+    """Nodes bound the depth of a pin between them: it stays below 0.4 of an edge, and the message says where."""
+    path, text = pushed(make(half), friction)
+    deepest = (0.5 - path["travel"][-1]) - path.wall().deformed_points[:, 2].min()
+    assert deepest > -0.45 * 8.5
+    if text:
+        assert "the tool of 'pin' passes through the sheet at (x, y, z) = (" in text and "smaller triangles" in text
+    else:
+        assert deepest > -0.05                               # nodes met it, and the sheet followed
+
+
+@pytest.mark.thorough
+def test_pins_are_held_by_small_triangles():
+    path, text = pushed(pin(4.5), "stick", size=3.0, travel=8.0)
+    assert not text and path.wall().deformed_points[:, 2].min() == pytest.approx(-7.5, abs=0.01)
+
+
+def cavity(floor, friction, nodes_per_step, pressure=0.4):
+    """A sheet over a cone with a thin floor, 14 below."""
+    plate = fx.tools.revolved(fx.Tool([(0.0, -14.0 - floor), (27.0, -14.0 - floor), (27.0, -14.0), (0.0, -14.0)]))
+    cone = fx.tools.revolved(fx.Tool([(60.0, 0.0), (32.0, 0.0), (26.0, -14.0), (26.0, -14.0 - floor), (60.0, -20.0)]))
+    tool = fx.tools.union(cone, plate)
+    sheet = fx.mesh.sheet(fx.mesh.circle(35.0, part="quarter"), size=6.0)
+    contact = fx.Contact("bottom", tool, friction, name="mould", nodes_per_step=nodes_per_step)
+    scene = fx.Scene(mesh=sheet, thickness=1.0, materials=MATERIAL, supports=HELD, model=WRINKLES,
+                     loads=[fx.Pressure("top")], contacts=[contact])
+    return fx.trace(scene, until=fx.pressure(pressure), progress=False, step=fx.StepControl(length=1.0))
+
+
+@pytest.mark.parametrize("floor, friction, nodes_per_step", [
+    (0.15, "stick", 10), (1.2, "none", 10), *(pytest.param(*case, marks=pytest.mark.thorough) for case in (
+        (1.2, "stick", 10), (0.15, "none", 1), (2.5, 0.3, 10)))])
+def test_thin_floor_is_not_passed_in_long_steps(floor, friction, nodes_per_step):
+    path = cavity(floor, friction, nodes_per_step)
+    assert path.wall().deformed_points[:, 2].min() > -14.05 and path.filling("mould").touching[-1] > 0.3
+
+
+def test_points_on_the_tool_are_on_its_surface_and_dense():
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(2.0, 2.0), size=0.2).domain.geometry.x
+    rib = fx.tools.extruded(fx.Tool([(0.3, -0.7), (0.1, -0.3), (-0.1, -0.3), (-0.3, -0.7)]), "x")
+    for tool in (fx.tools.revolved(fx.tools.sphere(radius=0.8)), fx.tools.union(
+            fx.tools.box(half=(0.9, 0.9), depth=0.5, corner=0.3, fillet=0.2), rib)):
+        points = surface_points(tool, 0.1, sheet, 0.2)
+        assert np.abs(tool.signed_distance(points)).max() < 1e-3
+        from scipy.spatial import cKDTree
+        near = points[np.abs(points[:, 2]) < 0.5]
+        assert np.quantile(cKDTree(points).query(near, 2)[0][:, 1], 0.99) < 0.1
+
+
+def test_test_of_passed_tools_takes_a_tenth_of_the_time(monkeypatch):
+    spent, passed = [0.0], LaggedApproach.passed
+
+    def timed(*arguments):
+        begin = process_time()
+        found = passed(*arguments)
+        spent[0] += process_time() - begin
+        return found
+    monkeypatch.setattr(LaggedApproach, "passed", timed)
+    begin = process_time()
+    cavity(2.5, 0.3, 1)
+    assert 0 < spent[0] < 0.1 * (process_time() - begin)
