@@ -126,7 +126,8 @@ class LaggedApproach(Approach):
     @cached_property
     def _passed_tool(self) -> PassedTool | None:
         """Test for parts of the tool on the wrong side of the sheet; None for a sheet that is not flat at first."""
-        return PassedTool(self.face) if self.face.rule.surface.scene.mesh.flat else None
+        rule: Any = self.face.rule
+        return PassedTool(self.face) if rule.surface.scene.mesh.flat else None
 
     def passed(self, fields: np.ndarray, control: float) -> PassedPoint | None:
         """Return the point of the tool that passed the sheet farthest, or None if it passed less than is resolved.

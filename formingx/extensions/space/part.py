@@ -124,7 +124,7 @@ def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
                              f" {z.max():.6g}; or an outline, such as fx.mesh.rectangle(...)")
         return _positive_share((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
     corners = chords(outline_edges(trim, "part: trim"), "part: trim")
-    inside = _depth_in_polygon(points[:, :COORDINATES], corners)
+    inside = _depth_in_polygon(points[:, :2], corners)
     if inside.max() <= 0:
         (x_min, y_min), (x_max, y_max) = corners.min(0), corners.max(0)
         raise InputError(f"part: trim: the outline, with x from {x_min:.6g} to {x_max:.6g} and y from {y_min:.6g} to"
