@@ -288,3 +288,45 @@ def test_wall_at_an_element_boundary_is_the_mean_of_both_elements():
     walls = [trace(sheet(10, thickness=lambda R, k=k: 0.01 * (1 + 1e-6 * np.sin(k * R))), fx.pole_stretch(1.5))
              .profile().thickness for k in (0, 37, 61, 83)]
     assert abs(np.array(walls) / walls[0] - 1).max() < 1e-5
+
+
+@pytest.mark.parametrize("plane_strain", (False, True))
+@pytest.mark.parametrize("modulus", (0.03, 0.3))
+def test_a_flat_membrane_sags_under_its_weight_and_is_blown_through(plane_strain, modulus):
+    """It leaves the flat state under a constant weight; sag and height are those of a thin solid sheet."""
+    def run(model):
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=100.0, thickness=1.0, elements=(10, 1)), model=model,
+                         materials=fx.NeoHookean(c10=modulus / 2),
+                         kinematics=fx.PlaneStrain() if plane_strain else None,
+                         supports=[fx.Symmetry("axis", "r"), fx.SimplySupported("rim")],
+                         loads=[fx.Gravity(1e-6, 9.81), fx.Pressure("bottom", name="air")])
+        return fx.trace(scene, until=fx.pressure(1e-3 * modulus), progress=False)
+    membrane, solid = run(fx.Membrane()), run(None)
+    assert membrane["pole_height"][[0, -1]] == pytest.approx(solid["pole_height"][[0, -1]], rel=3e-3)
+    assert membrane["pole_height"][0] < -2 and membrane["pole_height"][-1] > 15 and not membrane.limit_points
+
+
+def between_pressures(model, constant=None):
+    above = fx.Pressure("top", constant, name="above")
+    return fx.Scene(mesh=fx.mesh.disc(radius=100.0, thickness=1.0, elements=(8, 1)), model=model,
+                    materials=fx.NeoHookean(c10=0.01), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                    loads=[above, fx.Pressure("bottom", name="below")])
+
+
+@pytest.mark.parametrize("model", (fx.Membrane(), None))
+def test_absolute_pressures_act_by_their_difference(model):
+    """Both faces at 0.1, many times the modulus times thickness over radius, then one grows by 2e-5."""
+    both = [(0.0, 0.0), (1.0, 0.1)]
+    path = fx.Process(between_pressures(model)).run([
+        fx.Stage("both", amplitudes={"above": both, "below": both}),
+        fx.Stage("blow", control="below", until=fx.pressure(0.1 + 2e-5))], progress=False)
+    alone = fx.Scene(mesh=path.scene.mesh, model=model, materials=path.scene.materials, supports=path.scene.supports,
+                     loads=[fx.Pressure("bottom")])
+    exact = fx.trace(alone, until=fx.pressure(2e-5), progress=False)["pole_height"][-1]
+    assert path["pole_height"][-1] == pytest.approx(exact, rel=1e-8 if model else 5e-4)
+    assert not path.limit_points and not path.branch_points
+
+
+def test_a_constant_pressure_before_the_driven_one_is_named():
+    with pytest.raises(fx.ConvergenceError, match="only their difference deforms the body. Give the difference alone"):
+        fx.trace(between_pressures(None, 0.1), until=fx.pressure(0.1001), progress=False)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 import numpy as np
 
@@ -428,7 +428,8 @@ def begin(curve: Curve) -> State:
         try:
             problem.enter(replace(first, rate=[0.0] * len(first.rate), fading=True), rest, 0.0)
             run = Run(record, [(target, target.bind(problem))])
-            run.follow(1000, False, curve.resume(rest, 0.0))
+            # the unbalanced loads have faded: a flat membrane leaves the reference configuration as under a driven load
+            run.follow(1000, False, curve.start() if problem.singular_unloaded else curve.resume(rest, 0.0))
         except (ConvergenceError, Failure):
             raise _no_start(curve, failure) from None
         problem.enter(first, record.last.x, 0.0)
@@ -441,5 +442,12 @@ def _no_start(curve: Curve, failure: Failure) -> ConvergenceError:
     words = f", under {', '.join(loads)}" if loads else ""
     touches = "; a tool touches the body at rest: give its Contact a smaller ramp" * bool(curve.problem.active_contacts)
     advice = "; drive the largest of them instead" if loads else touches
+    problem: Any = curve.problem                            # the cause lies in its scene
+    scene = getattr(problem, "scene", None)
+    pressures = [load for load in scene.loads if load.quantity == "pressure"] if scene is not None else []
+    if {load.value is None for load in pressures} == {True, False}:
+        advice = ("; a pressure on one face has no equilibrium before that on the other face: only their difference"
+                  " deforms the body. Give the difference alone, or let both grow together in a first Stage,"
+                  " amplitudes={above: [(0, 0), (1, p)], below: [(0, 0), (1, p)]}, and then drive one of them")
     return ConvergenceError(f"no equilibrium was found before anything is driven{words}: {failure.reason}{advice}",
                             diagnosis=diagnose(curve, [], failure.reason, failure.attempt))

@@ -12,6 +12,10 @@ from .equations import Array, Attempt, Constraint, Equations, Quantity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
 
+_FLAT = 1e-8
+"""Mean displacement over the size of the body below which a body without stiffness is in the reference configuration.
+"""
+
 
 class StateSolver:
     r"""Solver for single states of a problem, with the arc length between states.
@@ -153,8 +157,13 @@ class StateSolver:
         """
         self._x.array_w[:] = x
         self.problem.residual(self._x, control, self.newton.F)
+        flat = self._has_no_stiffness()
+        if flat:                                            # such as a flat membrane between equal pressures
+            self.problem.stiff_state(self._x)
         if not self.newton.tangent(self._x, control):
             raise Failure("the tangent is singular: something in the body is held no more, or has no stiffness", [])
+        if flat:
+            self._x.set(0)
         return self._state(control, [], "start", None)
 
     def solve(self, x: Array, control: float, constraint: Constraint, kind: str, before: State,
@@ -385,8 +394,13 @@ class StateSolver:
                                               control - before.control) < 0:
             state.direction, state.slope = -state.direction, -state.slope
         if not self.fixed_control:
-            state.orientation = self.newton.solver.sign() * int(np.sign(state.slope))
+            sign = 0 if self._has_no_stiffness() else self.newton.solver.sign()     # it would be that of round-off
+            state.orientation = sign * int(np.sign(state.slope))
         return state
+
+    def _has_no_stiffness(self) -> bool:
+        """Return True if the unknowns `_x` are those of a flat membrane, which has no stiffness normal to itself."""
+        return self.problem.singular_unloaded and self.norm(self._x, 0.0) < _FLAT
 
     def _length_of(self, b: PETSc.Vec) -> float:
         """Return the arc length per unit of the control along a tangent b = dx/dcontrol."""
