@@ -107,7 +107,9 @@ build_root() {
         '/usr/lib/*/libLLVM*17*' '/usr/lib/python3/dist-packages/*/tests/baseline_images/*' '/usr/lib/*.a'; do
         set -- "$@" --dpkgopt="path-exclude=$p"
     done
-    for p in libc_nonshared.a 'libgcc*.a'; do set -- "$@" --dpkgopt="path-include=/usr/lib/*/$p"; done
+    for p in '/usr/lib/*/libc_nonshared.a' '/usr/lib/*/libgcc*.a' '/usr/share/javascript/sphinxdoc/*'; do
+        set -- "$@" --dpkgopt="path-include=$p"
+    done
     # in an ordinary container nothing can be mounted; dpkg and apt do without
     alone=
     if [ "$way" = copy ]; then set -- "$@" --mode=root --skip=check/canmount

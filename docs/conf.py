@@ -12,6 +12,7 @@ exclude_patterns = ["_build"]
 html_theme, html_title = "furo", "formingx"
 html_static_path = ["static"]
 html_css_files = ["formingx.css"]
+mathjax_path = "mathjax/tex-svg-full.js"                      # MathJax 3.2.2: equations are drawn without the internet
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 napoleon_use_ivar = True                                      # fields are documented once, by their own lines
