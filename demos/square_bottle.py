@@ -123,7 +123,7 @@ def main():
     options = parser("square_bottle", __doc__)
     args = options.parse_args()
     elements, columns, tube, solid_rows, free = (
-        ((20, 5), 8, (27, 4), 40, (14, 4)) if args.quick else ((60, 16), 32, (53, 16), 160, (54, 32)))
+        ((20, 5), 8, (27, 4), 40, (14, 4)) if args.quick else ((84, 24), 32, (53, 16), 160, (54, 32)))
     path = square_bottle(elements)
     wall, part = path.wall(), path.part(density=DENSITY, units=UNITS)
     section, ring = walls_at(wall, MID_HEIGHT), plane_strain(columns).wall()

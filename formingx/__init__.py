@@ -93,6 +93,7 @@ with _optional():
     from .extensions.space import checks as _space_checks
     from .extensions.space import mould_checks as _mould_checks
     from .extensions.space.names import MESHES, TOOLS
+    from .extensions.space.programme import WallProgramme, wall_programme
     _add(mesh, *MESHES)
     _add(tools, *TOOLS)
     del MESHES, TOOLS

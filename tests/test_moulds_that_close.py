@@ -138,3 +138,109 @@ def test_a_checkpoint_restores_an_intersection(tmp_path):
     x = np.random.default_rng(5).uniform(-40, 40, (50, 3))
     assert tool_of(plain(half)).signed_distance(x) == pytest.approx(half.signed_distance(x))
     assert len(path) > 1
+
+
+SQUARE = fx.tools.swept(fx.Tool([(35.0, 50.0), (35.0, -400.0)]), half=(35.0, 35.0), corner=12.0)
+"""Long square tube, open at both ends."""
+MELT = fx.MooneyRivlin(c10=0.05, c01=0.015)
+
+
+def blown(mesh, supports, tool=BOTTLE, part="quarter", volume=480e3, friction="stick", thickness=2.5):
+    """A tube that is blown by its volume, then by its pressure."""
+    found = fx.Scene(mesh=mesh, thickness=thickness, materials=MELT, model=fx.Membrane(wrinkles=0.01),
+                     supports=[*supports, *SYMMETRIES[part]], loads=[fx.Pressure("inner", name="air")],
+                     contacts=[fx.Contact("outer", tool, friction, name="mould")])
+    return found, [fx.Stage("air", control="air", amplitudes={fx.enclosed_volume: [(0, 0), (1, volume)]}),
+                   fx.Stage("hold", control="air", until=fx.pressure(0.6))]
+
+
+def run(scene_and_stages):
+    return fx.Process(scene_and_stages[0]).run(scene_and_stages[1], progress=False)
+
+
+@pytest.mark.thorough
+def test_middle_of_a_long_square_bottle_is_in_plane_strain():
+    """A tube bulges in its middle first, so it is stretched along its axis, too: walls for the same area of wall."""
+    long = fx.mesh.tube(radius=16.0, length=320.0, elements=(40, 10), part="quarter")
+    wall = run(blown(long, [fx.Clamped("neck"), fx.Clamped("end")], SQUARE, volume=1.1e6)).wall()
+    ring = fx.mesh.tube(radius=16.0, length=8.0, elements=(1, 10), part="quarter", z=-156.0)
+    strip = run(blown(ring, [fx.Symmetry(name, "z", guide=True) for name in ("neck", "end")], SQUARE,
+                      volume=1.1e6 / 40)).wall()
+    cuts = [w.section((0, 0, -160.1), (0, 0, 1)) for w in (wall, strip)]
+    areas = [np.sum(np.diff(cut["arc_length"]) * (cut["wall"][1:] + cut["wall"][:-1]) / 2) for cut in cuts]
+    for angle in (0, 22.5, 45):
+        x, y = np.cos(np.radians(angle)), np.sin(np.radians(angle))
+        three, plane = (np.interp(0.0, *np.array(sorted(zip(cut["x"] * y - cut["y"] * x, cut["wall"] / area))).T)
+                        for cut, area in zip(cuts, areas))
+        assert three == pytest.approx(plane, rel=0.02)
+
+
+@pytest.mark.thorough
+def test_quarter_half_and_whole_of_a_square_bottle():
+    parts = {}
+    for part, columns in (("quarter", 4), ("half", 8), ("whole", 16)):
+        mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(16, columns), part=part, end="closed")
+        path = run(blown(mesh, [fx.Clamped("neck")], part=part))
+        found = path.part(density=0.95, units=fx.Units(length="mm"))
+        parts[part] = np.array([found.weight, found.capacity, found.mean_wall, found.min_wall])
+    for part in ("half", "whole"):
+        assert parts[part] == pytest.approx(parts["quarter"], rel=0.01)
+
+
+def test_work_of_the_air_is_the_energy_of_the_wall():
+    found = scene(material=MELT, thickness=2.5)
+    volumes = np.linspace(0, 8e4, 41)
+    path = fx.trace(found, until=fx.enclosed_volume(8e4), progress=False,
+                    intermediate=[fx.enclosed_volume(v) for v in volumes[1:-1]])
+    p, V = path["pressure"], path["enclosed_volume"]
+    work = np.sum((p[1:] + p[:-1]) / 2 * np.diff(V))
+    assert path["strain_energy"][-1] == pytest.approx(work, rel=3e-3)
+
+
+@pytest.mark.thorough
+def test_work_of_the_air_in_a_mould():
+    """What the air does in the mould is stored in the wall: contact that sticks dissipates nothing but in its steps."""
+    mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(20, 5), part="quarter", end="closed")
+    path = run(blown(mesh, [fx.Clamped("neck")]))
+    p, V = path["air_pressure" if "air_pressure" in path.columns else "pressure"], path["enclosed_volume"]
+    work = np.sum((p[1:] + p[:-1]) / 2 * np.diff(V))
+    assert path["strain_energy"][-1] == pytest.approx(work, rel=0.01)
+
+
+@pytest.mark.thorough
+def test_programme_of_the_wall_gives_the_wanted_minimum_wall():
+    def build(wall):
+        mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(20, 5), part="quarter", end="closed")
+        length = float(mesh.arc_length([0.0], [0.0], [-172.0])[0])
+        return blown(mesh, [fx.Clamped("neck")],
+                     thickness=lambda x, y, z: wall(mesh.arc_length(x, y, z) / length))
+    found = fx.wall_programme(build, 0.7, start=2.5, low=1.0, high=6.0)
+    assert found.converged and found.min_walls[-1] == pytest.approx(0.7, rel=0.02) and len(found.tried) <= 6
+    assert found.path.part().volume < 4.3e4 and "wanted minimum wall" in str(found)
+    with pytest.raises(fx.InputError, match="start = 9.0: must be from"):
+        fx.wall_programme(build, 0.7, start=9.0, low=1.0, high=6.0)
+
+
+@pytest.mark.slow
+def test_melt_slides_into_a_square_bottle_with_fillets():
+    """Fillets larger than the triangles: sharp edges of a tool stop a sliding membrane."""
+    body = fx.tools.swept(fx.Tool([(0, -16), (10, -16), (35, -46), (35, -180), (0, -180)], [0, 0, 14, 12, 0]),
+                          half=(35.0, 35.0), corner=24.0)
+    tool = fx.tools.intersection(body, NECK, fillet=10.0)
+    found = {}
+    for friction in ("stick", 0.3, "none"):
+        mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(48, 12), part="quarter", end="closed")
+        path = run(blown(mesh, [fx.Clamped("neck")], tool, friction=friction))
+        assert path.filling("mould").touching[-1] > 0.98
+        found[friction] = path.part().min_wall
+    assert found["stick"] < found[0.3] < found["none"]
+
+
+def test_a_hanging_tube_sags_by_its_weight():
+    """rho g L^2 / (2 E) with E = 3 mu, up to the clamped neck."""
+    mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(21, 4), part="quarter")
+    hanging = fx.Scene(mesh=mesh, thickness=2.5, materials=fx.NeoHookean(c10=0.06),
+                       supports=[fx.Clamped("neck"), *SYMMETRIES["quarter"]],
+                       loads=[fx.Gravity(density=0.76e-9, value=9810.0)])
+    path = fx.Process(hanging).run([fx.Stage("hang", duration=1.0)], progress=False)
+    assert path["sag"][-1] == pytest.approx(0.76e-9 * 9810 * 210**2 / 2 / (3 * 0.12), rel=0.02)
