@@ -91,6 +91,7 @@ with _optional():
     from .extensions.fits.fit_damping import Spectrum, fit_spectrum
 with _optional():
     from .extensions.space import checks as _space_checks
+    from .extensions.space import crossing as _crossing_checks
     from .extensions.space import mould_checks as _mould_checks
     from .extensions.space.names import MESHES, TOOLS
     from .extensions.space.programme import WallProgramme, wall_programme

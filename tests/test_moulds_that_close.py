@@ -1,10 +1,14 @@
 """Moulds of several parts in three dimensions: intersections, half moulds, pressure on a part, capacity, pinch-off."""
 
+import re
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from test_tubes import CAPPED, SYMMETRIES, scene
 
 import formingx as fx
+from formingx.extensions.space import crossing
 from formingx.extensions.space.surface_mesh import below
 
 BODY = fx.tools.swept(fx.Tool([(0, -16), (10, -16), (35, -46), (35, -180), (0, -180)], [0, 0, 12, 6, 0]),
@@ -244,3 +248,41 @@ def test_a_hanging_tube_sags_by_its_weight():
                        loads=[fx.Gravity(density=0.76e-9, value=9810.0)])
     path = fx.Process(hanging).run([fx.Stage("hang", duration=1.0)], progress=False)
     assert path["sag"][-1] == pytest.approx(0.76e-9 * 9810 * 210**2 / 2 / (3 * 0.12), rel=0.02)
+
+
+def test_layers_that_cross_are_reported(monkeypatch):
+    """A surface whose nodes are moved through each other, or through a plane of symmetry."""
+    path = fx.trace(scene(), until=fx.enclosed_volume(1e3), progress=False)
+    wall = path.wall()
+    assert list(crossing.crossing_layers(path)) == []
+    for shift, words in ((-20.0, "passes .* through the plane of symmetry x = 0"), (0.0, "at .* edges")):
+        moved = wall.deformed_points.copy()
+        low = wall.reference_points[:, 2] < -60
+        moved[low] = moved[low] + [shift, 0, 0] if shift else moved[low] * [1, 1, -1] + [0.0, 0.0, -120.0] + [2, 1, 0]
+        monkeypatch.setattr(path, "wall", lambda moved=moved: replace(wall, deformed_points=moved))
+        found = list(crossing.crossing_layers(path))
+        assert found and re.search(words, found[0].text) and found[0].severity == "serious"
+    flat = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, -1], [1, 1, 1], [2, 1, 1.0]])
+    assert crossing.crossings(flat, np.array([[0, 1, 2], [3, 4, 5]]), 0.1) == pytest.approx(
+        np.array([[1, 1, 0], [1.5, 1, 0]]))
+    above = flat + np.repeat([[0.0, 0, 0], [0, 0, 3]], 3, axis=0)
+    assert len(crossing.crossings(above, np.array([[0, 1, 2], [3, 4, 5]]), 0.1)) == 0
+
+
+@pytest.mark.thorough
+def test_two_halves_on_a_whole_tube():
+    mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(30, 12))
+    halves = [fx.Contact("outer", fx.tools.half(BOTTLE, normal).moved(x=opening), "stick",
+                         direction=(-np.sign(opening), 0, 0), name=name)
+              for normal, opening, name in (("x", 40.0, "right"), ("-x", -40.0, "left"))]
+    closing = fx.Scene(mesh=mesh, thickness=2.5, materials=MELT, model=fx.Membrane(wrinkles=0.01), contacts=halves,
+                       supports=[fx.Clamped("neck"), fx.Symmetry("end", "z", guide=True)],
+                       loads=[fx.Pressure("inner", name="air", above=-180.0)])
+    path = fx.Process(closing).run([
+        fx.Stage("pre-blow", control="air", until=fx.pressure(0.002)),
+        fx.Stage("close", amplitudes={"left": [(0, 0), (1, 40.0)], "right": [(0, 0), (1, 40.0)]})], progress=False)
+    wall = path.wall()
+    tail = wall.deformed_points[wall.reference_points[:, 2] < -185]
+    assert np.abs(tail[:, 0]).max() < 0.05 and 1.5 < tail[:, 1].max() / 16 < np.pi / 2
+    assert path["left_force"][-1] == pytest.approx(path["right_force"][-1], rel=1e-3)
+    assert not list(crossing.crossing_layers(path))

@@ -31,6 +31,11 @@ class WallProgramme(KeyNumbers):
         wanted: wanted minimum wall, length.
         converged: True if the minimum wall is within the tolerance of the wanted one.
         units: units of the labels.
+
+    >>> import numpy as np
+    >>> found = fx.WallProgramme(np.array([1.0, 1.2]), path, np.ones((1, 2)), np.array([0.5]), 0.5, True)
+    >>> found.thickness.tolist(), found.converged
+    ([1.0, 1.2], True)
     """
 
     thickness: np.ndarray
@@ -86,6 +91,16 @@ def wall_programme(build: Callable[[Callable], tuple[Any, Any]], min_wall: float
     Raises:
         InputError: an argument that is not allowed, or a mesh without a meridian.
         ConvergenceError: the first run fails.
+
+    >>> def build(wall):
+    ...     tube = fx.mesh.tube(radius=10.0, length=40.0, elements=(6, 4), part="quarter", end="closed")
+    ...     scene = fx.Scene(mesh=tube, thickness=lambda x, y, z: wall(tube.arc_length(x, y, z) / 45.7),
+    ...                      materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
+    ...                      supports=[fx.Clamped("neck"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])
+    ...     return scene, fx.enclosed_volume(6000.0)
+    >>> found = fx.wall_programme(build, min_wall=0.9, start=1.0, low=0.5, high=2.0, knots=3)
+    >>> found.converged, bool(abs(found.min_walls[-1] / 0.9 - 1) < 0.02)
+    (True, True)
     """
     wanted, t0 = positive("wall_programme: min_wall", min_wall), positive("wall_programme: start", start)
     bounds = positive("wall_programme: low", low), positive("wall_programme: high", high)
