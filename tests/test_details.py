@@ -253,3 +253,14 @@ def test_a_step_of_a_flow_ends_at_the_first_of_two_targets():
                       step=fx.StepControl(length=1.0))
         path = fx.Process(sheet(RELAXES, elements=(4, 1))).run([stage], progress=False, accuracy=0.5)
         assert path.target_state(near).time < path.target_state(far).time
+
+
+def test_a_figure_is_the_current_one_of_pyplot(monkeypatch):
+    """`plot_wall()` and then `plt.gcf().savefig(...)`, as scripts do."""
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    pyplot.close("all")
+    axes = fx.NeoHookean(c10=0.4).plot()
+    assert pyplot.gcf() is axes.figure and len(pyplot.gcf().axes[0].lines) == 3 and axes._repr_png_()
+    pyplot.close("all")

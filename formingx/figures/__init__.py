@@ -48,6 +48,25 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
     return drawing, axes[0] if len(axes) == 1 else axes
 
 
+def new_axes() -> Any:
+    """Return the axes of a new figure with one plot.
+
+    If the script uses `matplotlib.pyplot`, the figure is its current one (`plt.gcf()`); not in a notebook, which shows
+    the returned axes.
+    """
+    pyplot = sys.modules.get("matplotlib.pyplot")
+    drawing, axes = figure()
+    if pyplot is not None and "ipykernel" not in sys.modules:
+        from .notebook import ShownFigure
+        current = pyplot.figure(FigureClass=ShownFigure, figsize=drawing.get_size_inches(), layout="constrained")
+        drawing.delaxes(axes)
+        axes = current.add_subplot(axes_class=type(axes))
+        axes.grid(True, color="0.9", linewidth=0.7)
+        axes.set_axisbelow(True)
+        axes.spines[["top", "right"]].set_visible(False)
+    return axes
+
+
 def pyvista() -> Any:
     """Return the module pyvista, imported without `matplotlib.pyplot`, which is slow to import.
 

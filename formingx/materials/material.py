@@ -22,7 +22,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, check_name, finite, positive
-from ..figures import Axes, figure
+from ..figures import Axes, new_axes
 from . import homogeneous
 from .constants import OfTemperature, Sample, Varying, varying
 from .energies import Energies
@@ -262,7 +262,7 @@ class Material(Energies):
         Returns:
             The matplotlib axes.
         """
-        drawn: Any = figure()[1] if axes is None else axes
+        drawn: Any = new_axes() if axes is None else axes
         for mode in MODES:
             l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else stretches
             drawn.plot(l, self.stress(mode, l), label=mode.replace("_", " "))

@@ -23,7 +23,7 @@ import ufl
 from numpy.typing import ArrayLike
 
 from ..errors import InputError, check_name, positive
-from ..figures import Axes, figure
+from ..figures import Axes, new_axes
 from ..physics import kinematics
 from . import branches as tests
 from .constants import OfTemperature, Sample
@@ -303,7 +303,7 @@ class GeneralisedMaxwell(RelaxingMaterial):
             The matplotlib axes.
         """
         check_name(f"{self}: plot: mode", mode, MODES)
-        drawn: Any = figure()[1] if axes is None else axes
+        drawn: Any = new_axes() if axes is None else axes
         l = np.linspace(1, min(6.0, 0.95 * self.largest_stretch(mode)), 200) if stretches is None else np.asarray(
             stretches, dtype=float)
         if rates is None:

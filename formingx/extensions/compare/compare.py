@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from ... import figures
 from ...errors import InputError, as_list, check_name, check_type
 from ...findings import percent
 from ...io import csv_files
 from ...results import files
-from ...results.show import plots
 from ...values.tolerances import FAR
 from .curves import SampledCurve, arc_length, pair_at_equal_values, pair_in_order, ranges, resolution_of
 
@@ -124,7 +124,7 @@ class Comparison:
         Returns:
             The matplotlib figure.
         """
-        figure, (left, right) = plots.figure(2)
+        figure, (left, right) = figures.figure(2)
         if self.along == ", ".join(_MAP):
             name, d = next(iter(self.differences.items()))
             points = self.theirs[self.pairs[0]]

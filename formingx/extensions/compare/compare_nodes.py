@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import figures
 from ... import mesh as meshes
 from ...errors import InputError, check_name
 from ...findings import percent
@@ -16,7 +17,6 @@ from ...forms.probes import probe
 from ...io import csv_files
 from ...mesh import text as grid
 from ...results import files
-from ...results.show import plots
 
 _COORDINATES_OF = {2: ("R", "Z"), 3: ("X", "Y", "Z")}
 """{number of displacement components: columns of the reference coordinates}; a sheet in three dimensions is flat."""
@@ -76,7 +76,7 @@ class NodalComparison:
         Returns:
             The matplotlib figure.
         """
-        figure, axes = plots.figure()
+        figure, axes = figures.figure()
         reference = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - 2)))               # flat in three dimensions
         for u, style, label in ((self.ours, {"marker": "o", "fillstyle": "none"}, "ours"),
                                 (self.theirs, {"marker": "x", "color": "k"}, "theirs")):

@@ -77,8 +77,8 @@ class Effects:
         Returns:
             The matplotlib axes.
         """
-        from ...figures import figure
-        axes = axes if axes is not None else figure()[1]
+        from ...figures import new_axes
+        axes = axes if axes is not None else new_axes()
         tenth, n = (self.jacobian * self.sizes / 10).T, len(self.names)
         most = abs(tenth).max() or 1.0
         coordinates = self.coordinates if len(self.coordinates) > 1 else np.array([0.0, 1.0])

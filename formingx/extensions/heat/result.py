@@ -310,8 +310,8 @@ class HeatRun:
         Returns:
             The matplotlib axes.
         """
-        from ...figures import figure
-        axes = figure()[1] if axes is None else axes
+        from ...figures import new_axes
+        axes = new_axes() if axes is None else axes
         chosen = self._times_or_outputs(times)
         distance, T = self.line_profile(chosen, line=line)
         for k, (t, row) in enumerate(zip(chosen, T)):

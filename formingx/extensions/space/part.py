@@ -29,6 +29,8 @@ class SheetPart(PartNumbers):
         min_wall: minimum wall thickness, length.
         min_wall_at: deformed position (x, y, z) of the minimum wall, length.
         min_wall_reference: reference position of the minimum wall, (X, Y) on a flat sheet, else (X, Y, Z), length.
+        min_wall_error: estimated error of the minimum wall, length: the true minimum is smaller by about as much
+            (`SheetWall.error_of`).
         uniformity: minimum over mean wall thickness.
         variation: standard deviation of the wall thickness over the surface, over its mean.
         weight: weight in grams if a density in g/cm3 was given; else None.
@@ -55,6 +57,7 @@ class SheetPart(PartNumbers):
     basis: str = ""
     units: Units = field(repr=False, default=NONE)
     capacity: float | None = None
+    min_wall_error: float = 0.0
 
     @property
     def rows(self) -> list[tuple[str, str]]:
@@ -64,7 +67,8 @@ class SheetPart(PartNumbers):
         axes = "(X, Y)" if len(self.min_wall_reference) == 2 else "(X, Y, Z)"
         holds = [] if self.capacity is None else [
             ("capacity", self._with_unit(self.capacity, self.units.volume))]
-        return self._rows(f"(x, y, z) = ({deformed}), from {axes} = ({reference})", []) + holds + (
+        return self._rows(f"(x, y, z) = ({deformed}), from {axes} = ({reference}), too large by"
+                          f" about {self._length(self.min_wall_error)}", []) + holds + (
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 
 
@@ -103,7 +107,7 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
                      float(wall.wall[k] / mean),
                      float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
                      weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()),
-                     planes.basis(None), units, None if wall.flat else wall.capacity())
+                     planes.basis(None), units, None if wall.flat else wall.capacity(), wall.error_of(k))
 
 
 def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:

@@ -103,6 +103,20 @@ class SheetWall(ColumnTable):
         """
         return self.to_nodes(self.wall)
 
+    def error_of(self, triangle: int) -> float:
+        """Return the estimated error of the wall of a triangle at a minimum of the wall, length.
+
+        A minimum lies in a corner of the mould, where the wall of flat triangles decreases with their size. The
+        estimate is the mean wall of the triangles that share a node with this one, minus its own wall. On five trays
+        with three meshes each it is 0.5 to 3 times the difference to triangles of a quarter of the size.
+
+        Args:
+            triangle: number of the triangle.
+        """
+        shared = np.asarray(np.isin(self.triangles, self.triangles[triangle]).any(axis=1))
+        shared[triangle] = False
+        return float(max(self.wall[shared].mean() - self.wall[triangle], 0.0)) if shared.any() else 0.0
+
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """Columns of the table that `to_csv` writes, with a row for each triangle: {name: values, shape (m,)}.

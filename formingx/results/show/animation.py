@@ -138,7 +138,7 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     ratios = [s.wall_ratio for s in shapes]
     colours = Normalize(min(r.min() for r in ratios), max(r.max() for r in ratios))
     wide = float(np.clip(3.5 * (high - low)[0] / (high - low)[1] + 1.4, 2.8, 6.0))    # a bottle fills its panel, too
-    figure, (sheet, loading) = plots.figure(2, width=wide / 2 + 2, height=4.2, ratios=(wide, 4))
+    figure, (sheet, loading) = figures.figure(2, width=wide / 2 + 2, height=4.2, ratios=(wide, 4))
     bar = figure.colorbar(ScalarMappable(colours, "viridis_r"), ax=sheet, shrink=0.8, label="thickness / original")
     bar.outline.set_visible(False)
 

@@ -2,7 +2,7 @@
 
 from typing import Any
 
-from ...figures import figure
+from ...figures import new_axes
 
 
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
@@ -20,7 +20,7 @@ def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
     Returns:
         The matplotlib axes; `axes.figure.savefig` saves them.
     """
-    axes = axes if axes is not None else figure()[1]
+    axes = axes if axes is not None else new_axes()
     drawn, = axes.plot(*path.curve(x, y), **style)
     axes.plot(path[x], path[y], ".", color=drawn.get_color())
     for states, mark in ((path.limit_points, "o"), (path.jumps, "D")):
@@ -46,7 +46,7 @@ def convergence(path: Any, axes: Any = None) -> Any:
     Returns:
         The matplotlib axes.
     """
-    axes = axes if axes is not None else figure()[1]
+    axes = axes if axes is not None else new_axes()
     lines = [[i.correction for i in state.history if i.correction > 0] for state in path.states]
     number = [k for line in lines for k in (*range(1, len(line) + 1), None)]
     axes.semilogy(number, [c for line in lines for c in (*line, None)], ".-", color="tab:blue", alpha=0.5, linewidth=1)
