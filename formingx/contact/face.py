@@ -116,6 +116,11 @@ class FaceContact:
         """Return the displacement of the tool at a load parameter (control), shape (components,), length."""
         return (self._base + self._rate * control) * self._travel_vector
 
+    @property
+    def moves(self) -> bool:
+        """True if the tool moves as the control changes, in the current stage."""
+        return bool(self._rate)
+
     def relative_motion(self, dx: np.ndarray, step: np.ndarray | float) -> np.ndarray:
         """Return the motion of the points relative to the tool in a change of the state, shape (n, components), length.
 

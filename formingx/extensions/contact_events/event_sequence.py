@@ -42,8 +42,9 @@ class EventSettings:
         max_changes: maximum number of status changes (slip, opening) between two gap closures.
         max_sliding_points: maximum number of points that slide at the accepted state. With more, their contact forces
             follow from the stiffness in the factorised tangent instead of Coulomb's law.
-        sticking_tolerance: convergence tolerance of the position of a point that sticks, over its tributary length.
-        sliding_tolerance: convergence tolerance of the position of a point that may slide, over its tributary length.
+        sticking_tolerance: convergence tolerance of the position of a gap closure, over the tributary length of the
+            point. Most points with Coulomb friction stick near this position, too.
+        sliding_tolerance: the same for points that may slide on a moving tool.
         arc_length_tolerance: convergence tolerance of the arc length of a gap closure, over its distance from the last
             event. A point near a constrained end hardly moves along its tool, so its position alone says little.
         simultaneous_fraction: fraction of the step within which two closures count as simultaneous.
@@ -318,8 +319,9 @@ class ContactEventSequence:
             x, w = positions[row], self._pieces[-1].speed[row]
             ds = crossing(face.law, i, x, w, self._pieces[-1].begins - s, _SETTINGS.sticking_tolerance,
                           _SETTINGS.max_surface_iterations)
-            closure = GapClosure(s + ds, rank, f, i, x + ds * w, float(face.rule.lengths[i]),
-                                 bool(self._points.sticks[row]))
+            slides = face.moves and not self._points.sticks[row]
+            tolerance = _SETTINGS.sliding_tolerance if slides else _SETTINGS.sticking_tolerance
+            closure = GapClosure(s + ds, rank, f, i, x + ds * w, tolerance * float(face.rule.lengths[i]))
         return closure if self._comm.size == 1 else self._comm.bcast(closure, root=rank)
 
     def _equilibrate(self, length: float) -> bool:
@@ -351,10 +353,9 @@ class ContactEventSequence:
             if late or not found.arc_length > last.begins:
                 return False
             self._closures[-1], self._end = found, (end := end.after(found.arc_length))
-            near = (_SETTINGS.sticking_tolerance if found.sticks else _SETTINGS.sliding_tolerance) * found.length
             settled = abs(found.arc_length - closure.arc_length) < _SETTINGS.arc_length_tolerance * (
                 closure.arc_length - last.begins)
-            if settled and np.linalg.norm(found.place - closure.place) < near:
+            if settled and np.linalg.norm(found.place - closure.place) < found.tolerance:
                 arc_lengths = self._missed(end, last, found)
                 if not self._store_first(arc_lengths, found.arc_length, end):
                     return True

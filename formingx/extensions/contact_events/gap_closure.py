@@ -18,8 +18,7 @@ class GapClosure(NamedTuple):
         face: number of the contact face.
         point: local number of the point.
         place: position of the point relative to the tool at the event, shape (2,), length.
-        length: tributary length of the point, length.
-        sticks: True if the point sticks under any force (contact without slip).
+        tolerance: convergence tolerance of `place`, length.
     """
 
     arc_length: float
@@ -27,8 +26,7 @@ class GapClosure(NamedTuple):
     face: int
     point: int
     place: np.ndarray
-    length: float
-    sticks: bool
+    tolerance: float
 
     @property
     def point_id(self) -> tuple[int, int, int]:

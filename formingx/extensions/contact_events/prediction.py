@@ -38,6 +38,8 @@ class ContactEventPredictor:
         """Return the number of points of a face whose gaps may close in one step.
 
         It exceeds `Approach.max_closures` only on faces with stick or friction whose contact has `nodes_per_step=None`.
+        On a moving tool it does so only if points stick on a tool, since long steps of a plug with Coulomb friction may
+        pass a snap.
 
         Args:
             approach: the contact of the face.
@@ -46,7 +48,8 @@ class ContactEventPredictor:
             Number of points on all ranks.
         """
         face, most = approach.face, approach.max_closures
-        one_by_one = not self._limit.several_closures or face.contact.nodes_per_step or face.contact.lagged
+        one_by_one = (not self._limit.several_closures or face.contact.nodes_per_step or face.contact.lagged
+                      or face.moves and not any(c.face.contact.sticks for c in self._limit.active_contacts))
         if one_by_one or not face.law.has_friction:
             return most
         return max(most, round(MAX_CLOSURES * approach.points))
@@ -55,11 +58,11 @@ class ContactEventPredictor:
     def active(self) -> bool:
         """True if contact events are predicted for the contacts that are active now.
 
-        At least one contact must be without slip (`Contact.sticks`) and allow several gap closures in a step. All
-        contact laws must be predictable (`ContactLaw.predictable`), so that forces follow from distances.
+        At least one contact must allow several gap closures in a step. All contact laws must be predictable
+        (`ContactLaw.predictable`), so that forces follow from distances.
         """
         contacts = self._limit.active_contacts
-        return any(c.face.contact.sticks and self.allowed(c) > c.max_closures for c in contacts) and all(
+        return any(self.allowed(c) > c.max_closures for c in contacts) and all(
             c.face.law.predictable for c in contacts)
 
     def predict(self, curve: Any, state: Any) -> ContactEventPrediction | None:
