@@ -23,17 +23,19 @@ from __future__ import annotations
 from collections.abc import Callable, Hashable, Sequence
 from contextlib import AbstractContextManager
 from os import PathLike
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
+import numpy.typing as npt
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..contact.face import FaceContact
 from ..contact.step_limit import StepLimit
 from ..forms.history import ConstitutiveHistory
 from ..forms.schedule import StepData
-from .contact_faces import Array as Array
-from .contact_faces import ContactFace
+
+Array: TypeAlias = npt.NDArray[Any]
 
 Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
 """Function (x, control, gradient) -> (c, dc/dcontrol) of a constraint c = 0; it sets the vector `gradient` to dc/dx."""
@@ -208,7 +210,7 @@ class ActiveSet(Protocol):
         return False
 
     @property
-    def active_contacts(self) -> Sequence[ContactFace]:
+    def active_contacts(self) -> Sequence[FaceContact]:
         """Faces in contact that are active in the current stage."""
         return []
 

@@ -22,9 +22,9 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
+from ..contact.face import FaceContact
 from ..ranks import combined, gathered, listed
 from .compliance import Border, columns
-from .contact_faces import ContactFace
 from .equations import Array, Equations
 from .linear import DirectSolver
 
@@ -169,7 +169,7 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
     return lambda V, step: small.updated(V, step, stiffer)
 
 
-def unit_forces(problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array]) -> Array:
+def unit_forces(problem: Equations, contacts: Sequence[FaceContact], chosen: list[Array]) -> Array:
     """Return the contributions to the residual F of unit forces at contact points, for each component of each point.
 
     Args:
@@ -207,7 +207,7 @@ class _Points:
             changes of the control, shape (m,).
     """
 
-    def __init__(self, problem: Equations, contacts: Sequence[ContactFace], chosen: list[Array],
+    def __init__(self, problem: Equations, contacts: Sequence[FaceContact], chosen: list[Array],
                  solver: DirectSolver, border: Border):
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
         self._c = contacts[0].points.shape[1]               # number of components

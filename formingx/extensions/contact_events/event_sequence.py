@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
+from ...contact.approach import LIMITS
 from ...contact.gap_closures import crossing, gap_closures
 from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
@@ -86,6 +87,8 @@ class ContactEventSequence:
         touching: number of closed points of each face at the state, on all ranks.
         ends: arc length up to which the prediction is valid; inf without a limit.
         stops: True if the prediction ends since no admissible contact statuses were found at `ends`.
+        slip_ends: arc length of the first event at which a point sticks after it has slipped along its tool by more than
+            `StepLimits.max_slip_ratio`; inf without one.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,
@@ -106,7 +109,7 @@ class ContactEventSequence:
         self._near = self._points.tool_frame(self._pieces[0].positions, blank)     # at the start of the last segment
         self._end: PathSegment | None = None                # end of the last segment, in equilibrium
         self._taken = self._work = 0                        # closures with a contact force; `EventSettings.max_work`
-        self.ends, self.stops = np.inf, False
+        self.ends, self.stops, self.slip_ends = np.inf, False, np.inf
         if not self._free_sliding():
             self._pieces, self.ends = self._pieces[:1], 0.0
 
@@ -236,11 +239,15 @@ class ContactEventSequence:
             return False
         rate, growth, status = found
         stuck = (status == ContactStatus.STICKS) & (np.abs(piece.status) == 1)
-        slip = (piece.status * points.elastic_slip)[:, None] * near.tangent
+        slip, before = (piece.status * points.elastic_slip)[:, None] * near.tangent, piece.place
         piece = piece._replace(
             place=np.where(stuck[:, None], points.values_at(piece.positions) - slip, piece.place), status=status,
             rate=rate, growth=growth, force=np.where((status == ContactStatus.FREE)[:, None], 0.0, piece.force),
             speed=self._along - points.motion_under(growth))
+        if stuck.any() and self.slip_ends == np.inf:
+            slipped = np.linalg.norm(piece.place - before, axis=1)[stuck]
+            lengths = points.values_at(np.concatenate([face.rule.lengths for face in self._faces]))[stuck]
+            self.slip_ends = piece.begins if np.any(slipped > LIMITS.max_slip_ratio * lengths) else np.inf
         points.spread(status == ContactStatus.FREE, self._free)
         self._pieces.append(piece)
         return True

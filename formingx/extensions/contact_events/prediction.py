@@ -105,7 +105,8 @@ class ContactEventPrediction:
         """Return the arc length after which the gaps of the admissible number of points of a face have closed.
 
         The class has this number, `allowed`. It is 1 on a face of which at most one point is closed at the accepted
-        state. The length is halved while a point would pass through a tool.
+        state. If no contact is without slip, the step ends where a point sticks after it has slipped, since the law would
+        have it stick where it was at the start. The length is halved while a point would pass through a tool.
 
         Args:
             length: largest arc length of the step.
@@ -114,6 +115,9 @@ class ContactEventPrediction:
             Arc length, at most `length`. None if the prediction failed; then the other methods also return None.
         """
         found, sequence = self._length_to_closures(length) if self._known else None, self._sequence
+        slides = not any(c.face.contact.sticks for c in self._contacts)
+        if found is not None and slides and LIMITS.start_fraction * length < sequence.slip_ends < found:
+            found = LIMITS.overshoot * sequence.slip_ends
         while found is not None and found > LIMITS.min_length and any(
                 [c.cuts_tool(a, b)
                  for c, a, b in zip(self._contacts, sequence.positions(0.0), sequence.positions(found))]):
