@@ -176,6 +176,26 @@ def test_events_of_coulomb_friction_on_a_mould():
     assert many.counts.steps < 30                           # 61 with one gap closure a step, in steps of any length
 
 
+def vacuum_formed(nodes_per_step):
+    """Return the path of the sheet of demos/male_mould.py with friction up to 20 psi."""
+    wide = 4.0 + 3.0 * np.tan(np.radians(10.0))
+    mould = tools.Tool([(10.0, 0.0), (10.0, -3.05), (wide, -3.05), (4.0, -0.05), (0.0, -0.05)], [0, 1.0, 1.0, 1.5, 0])
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(20, 1)),
+                     materials=fx.MooneyRivlin(c10=50.0, c01=15.0), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
+                     loads=[fx.Pressure("top")],
+                     contacts=[fx.Contact("bottom", mould, 0.3, nodes_per_step=nodes_per_step)])
+    return fx.trace(scene, until=fx.pressure(20.0), intermediate=[fx.pressure(p) for p in (2.0, 5.0, 10.0)],
+                    step=fx.StepControl(target=8, length=0.1), progress=False)
+
+
+@pytest.mark.thorough
+def test_a_step_ends_where_points_stick_after_they_slipped():
+    """A sheet slips over the top of a male mould, sticks there, and has the wall of one gap closure a step."""
+    many, one = (vacuum_formed(nodes_per_step) for nodes_per_step in (None, 1))
+    assert many.counts.steps < 0.8 * one.counts.steps
+    assert many.profile().thickness[0] == pytest.approx(one.profile().thickness[0], rel=1e-3)
+
+
 def test_a_plug_with_friction_takes_one_gap_closure_a_step():
     """With a mould and a plug under Coulomb friction, several gaps close in one step on the mould alone."""
     mould = fx.tools.cup(radius=38.0, depth=60.0, mouth=1.2, draft=6.0, fillet=5.0, lip=2.0)

@@ -87,8 +87,8 @@ class ContactEventSequence:
         touching: number of closed points of each face at the state, on all ranks.
         ends: arc length up to which the prediction is valid; inf without a limit.
         stops: True if the prediction ends since no admissible contact statuses were found at `ends`.
-        slip_ends: arc length of the first event at which a point sticks after it has slipped along its tool by more than
-            `StepLimits.max_slip_ratio`; inf without one.
+        slip_ends: arc length of the first event at which a point sticks after it has slipped along its tool, by more
+            than `StepLimits.max_slip_ratio`; inf without one.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,

@@ -105,8 +105,8 @@ class ContactEventPrediction:
         """Return the arc length after which the gaps of the admissible number of points of a face have closed.
 
         The class has this number, `allowed`. It is 1 on a face of which at most one point is closed at the accepted
-        state. If no contact is without slip, the step ends where a point sticks after it has slipped, since the law would
-        have it stick where it was at the start. The length is halved while a point would pass through a tool.
+        state. If no contact is without slip, the step ends where a point sticks after it has slipped. In a longer step
+        it would stick where it was at the start. The length is halved while a point would pass through a tool.
 
         Args:
             length: largest arc length of the step.
