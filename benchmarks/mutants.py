@@ -165,8 +165,8 @@ MUTANTS = [Mutant(*row) for row in [
      "remaining[k] - gap) / (gap + remaining[k]", "evaluation"),
     ("results/evaluate/point_stress.py", "n[:, 1], -n[:, 0]", "n[:, 1], n[:, 0]", "stress"),
     # residuals and tangents of each load, model and body
-    ("physics/loads.py", "return -value * ufl.inner(area, body.du)", "return -1.001 * value * ufl.inner(area, body.du)",
-     "closed_forms treloar"),
+    ("physics/loads.py", "return -value * self.share(body) * ufl.inner",
+     "return -1.001 * value * self.share(body) * ufl.inner", "closed_forms treloar"),
     ("physics/loads.py", "self.density, body.du[body.kinematics.components - 1])", "self.density, body.du[0])",
      "terms sag"),
     ("physics/loads.py", "(body.X[0] + body.u[0]) * body.du[0])", "body.X[0] * body.du[0])", "terms"),
