@@ -218,6 +218,26 @@ def test_stages_friction_and_time(relaxing):
         assert np.linalg.norm(by[:, k] - whole) < (0.02 if relaxing else 2e-3) * np.linalg.norm(whole), name
 
 
+def hinged(c10, h, duration):
+    """A relaxing sheet that is hinged at its rim, blown in a given time, then held."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=h, elements=(8, 1)),
+                     materials=fx.Viscoelastic(fx.NeoHookean(c10=c10), [(0.4, 1.0)]), **{
+                         **CAN, "loads": [fx.Pressure("bottom", name="air")]})
+    return scene, [fx.Stage("blow", control="air", until=fx.pressure(0.005), duration=duration),
+                   fx.Stage("hold", duration=1.0)]
+
+
+@pytest.mark.parametrize("h, duration", [(0.5, 1.0), (0.2, 0.1)])
+def test_a_relaxing_sheet_that_is_hinged_has_derivatives(h, duration):
+    """Its first states turn by round-off; the derivative is that of whole runs."""
+    design = fx.Design(lambda c10, h: hinged(c10, h, duration), {"c10": (0.2, 0.1, 0.4), "h": (h, 0.1, 1.0)})
+    by = design.run().derivative("pole_height")[1][0]
+    for k, (name, step) in enumerate({"c10": 2e-4, "h": 2e-4}.items()):
+        above, below = (design.run({"c10": 0.2, "h": h} | {name: {"c10": 0.2, "h": h}[name] + sign * step})
+                        .path["pole_height"][-1] for sign in (1, -1))
+        assert by[k] == pytest.approx((above - below) / (2 * step), rel=1e-3)
+
+
 def test_dissipated_energy_has_no_derivative_and_is_kept():
     """It depends on all states; a derivative of the wall leaves the run and its energy balance as they are."""
     design = fx.Design(lambda mu, travel: pot(mu, travel, relaxing=True), {"mu": (0.2, 0, 1), "travel": (0.3, 0.1, 1)})

@@ -49,6 +49,9 @@ class PerturbedTolerances:
 
 _TOLERANCES = PerturbedTolerances()
 
+_LARGEST_ROUND_OFF = 1e-10
+"""Largest correction, over the size of the unknowns, that counts as round-off if corrections become no smaller."""
+
 
 class PerturbedRunFailure(Failure):
     """Failure to find a state of a perturbed run near the state of the base run.
@@ -222,6 +225,7 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
     size = _norm(problem, state.x) + abs(state.control)
     tolerance = _TOLERANCES.tolerance_in_contact if problem.has_kinks else ROUND_OFF
     active, first = list(range(len(perturbed))), np.full(len(perturbed), np.inf)
+    least = np.full(len(perturbed), np.inf)                  # smallest correction so far
     for iteration in range(Tolerances.iterations):
         rows = np.column_stack([perturbed[k].residual(base_residual) for k in active])
         violations = np.array([constraint(k) for k in active])
@@ -240,11 +244,15 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
             if iteration != 1:                               # iteration 1 checks one perturbed run, and updates none
                 run.x, run.control = run.x + dx[:, column], run.control + steps[column]
             distance = _norm(problem, run.x - state.x) + abs(run.control - state.control)
-            failed = correction > max(_TOLERANCES.last_tolerance * distance, 10 * _TOLERANCES.round_off * size)
+            # a thin sheet that is hinged turns by round-off: its corrections become no smaller
+            stagnates = iteration > 2 and least[k] / 2 < correction <= _LARGEST_ROUND_OFF * size
+            least[k] = min(least[k], correction) if np.isfinite(correction) else least[k]
+            failed = not stagnates and correction > max(
+                _TOLERANCES.last_tolerance * distance, 10 * _TOLERANCES.round_off * size)
             if not np.isfinite(correction) or iteration == Tolerances.iterations - 1 and failed:
                 raise PerturbedRunFailure(f"with {run.name} a little changed no state is found near", [])
             first[k] = correction if iteration == 0 else first[k]
-            converged &= correction <= max(tolerance * distance, _TOLERANCES.round_off * size)
+            converged &= stagnates or correction <= max(tolerance * distance, _TOLERANCES.round_off * size)
         if converged:
             break
         # the error is now of second order: if the most corrected run has converged, so have the others
