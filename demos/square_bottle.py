@@ -98,10 +98,9 @@ def round_bottle(elements, solid_rows):
     bands, ends = [], np.linspace(first, length, 13)
     for low, high in zip(ends[:-1], ends[1:]):
         mine = (s > low) & (s < high)
-        x = np.linspace(low, high, 201)
-        r = np.where(x > ROUND_LENGTH - RADIUS, RADIUS * np.cos((x - ROUND_LENGTH + RADIUS) / RADIUS), RADIUS)
-        mean = np.average(np.interp(x, exact[::-1], thickness[::-1]), weights=r)
-        bands.append(np.average(wall.wall[mine], weights=wall.reference_area[mine]) / mean - 1)
+        of_solid = np.interp(s[mine], exact[::-1], thickness[::-1])
+        bands.append(np.average(wall.wall[mine], weights=wall.reference_area[mine])
+                     / np.average(of_solid, weights=wall.reference_area[mine]) - 1)
     inside = (exact > first) & (exact < length)
     return {"least_wall_over_solid": wall.wall[s > first].min() / thickness[inside].min(),
             "bands_largest_percent": 100 * np.abs(bands).max()}

@@ -24,7 +24,7 @@ def test_square_bottle(tmp_path):
     assert bottle["edge_mm"]["mid_height"] == pytest.approx(strain["edge_mm"], rel=0.02)
     assert bottle["middle_of_face_mm"]["mid_height"] == pytest.approx(strain["middle_of_face_mm"], rel=0.03)
     assert found["round"]["least_wall_over_solid"] == pytest.approx(1, abs=0.015)
-    assert found["round"]["bands_largest_percent"] < 2.2
+    assert found["round"]["bands_largest_percent"] < 2
     assert found["inflation"]["limit_pressure_R_over_mu_H"] == pytest.approx(0.91071, rel=1e-3)
     assert found["inflation"]["limit_volume_over_first"] == pytest.approx(2.7368, rel=1e-3)
     assert drawn(tmp_path / "square_bottle_3d.png")

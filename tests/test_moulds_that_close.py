@@ -99,6 +99,9 @@ def test_capacity_to_the_brim_and_to_a_fill_height():
     area = 2 * np.sum(x[:-1] * y[1:] - x[1:] * y[:-1])
     slope = (wall.capacity(-49.5) - wall.capacity(-50.5)) / 1.0
     assert slope == pytest.approx(area - 2 * np.pi * np.hypot(x, y).mean() * lid["wall"].mean(), rel=0.03)
+    upper, weight = path.part(trim=-50.0, density=0.95), path.part(density=0.95).weight
+    assert upper.capacity == pytest.approx(part.capacity - wall.capacity(-50.0))
+    assert upper.weight == pytest.approx((1 - upper.scrap) * weight) and 0.3 < upper.scrap < 0.7
     with pytest.raises(fx.InputError, match="capacity: level"):
         wall.capacity(5.0)
 

@@ -34,7 +34,8 @@ class SheetPart(PartNumbers):
         uniformity: minimum over mean wall thickness.
         variation: standard deviation of the wall thickness over the surface, over its mean.
         weight: weight in grams if a density in g/cm3 was given; else None.
-        capacity: volume that the part holds, length^3, up to its brim (`SheetWall.capacity`); None for a flat sheet.
+        capacity: volume that the part holds, length^3, up to its brim (`SheetWall.capacity`), above the plane of
+            `trim`; None for a flat sheet.
         scrap: volume that is trimmed off over the volume of the sheet.
         wrinkled: share of the reference area that is in compression.
         basis: text that states from which modelled part volume, area and weight were computed, such as a quarter; ""
@@ -79,8 +80,9 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
     Args:
         wall: wall of the sheet in the state.
         density: density in g/cm3, or None.
-        trim: z of the plane at which the formed sheet is cut, length; the part is the side away from the flat sheet. Or
-            an outline in the plane of x and y, as that of `fx.mesh.sheet`; the part is inside it. None: no cut.
+        trim: z of the plane at which the formed sheet is cut, length; the part is the side away from the flat sheet, or
+            the upper side of a surface that is not flat, such as a bottle above its flash. Or an outline in the plane
+            of x and y, as that of `fx.mesh.sheet`; the part is inside it. None: no cut.
         heights: must be empty, since `SheetWall.section` gives the wall along a cut.
         units: units of the labels.
         planes: mirror planes at which the modelled body ends.
@@ -107,7 +109,14 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
                      float(wall.wall[k] / mean),
                      float(np.sqrt(np.average((h - mean) ** 2, weights=area)) / mean),
                      weight, 1 - volume / whole, float(rest[wall.wrinkled[kept]].sum() / rest.sum()),
-                     planes.basis(None), units, None if wall.flat else wall.capacity(), wall.error_of(k))
+                     planes.basis(None), units, _capacity(wall, trim), wall.error_of(k))
+
+
+def _capacity(wall: SheetWall, trim: Any) -> float | None:
+    """Return the volume that a part holds, above the plane `trim` if that is a number, length^3; None if it is flat."""
+    if wall.flat:
+        return None
+    return wall.capacity() - (wall.capacity(float(trim)) if isinstance(trim, int | float) else 0.0)
 
 
 def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
@@ -126,7 +135,8 @@ def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
         if not z.min() < level < z.max():
             raise InputError(f"part: trim = {trim!r}: must be a z that the part passes: it goes from {z.min():.6g} to"
                              f" {z.max():.6g}; or an outline, such as fx.mesh.rectangle(...)")
-        return _positive_share((z - level)[wall.triangles] * np.sign(z[np.argmax(np.abs(z))] - level))
+        side = np.sign(z[np.argmax(np.abs(z))] - level) if wall.flat else 1.0
+        return _positive_share((z - level)[wall.triangles] * side)
     corners = chords(outline_edges(trim, "part: trim"), "part: trim")
     inside = _depth_in_polygon(points[:, :2], corners)
     if inside.max() <= 0:
