@@ -71,20 +71,26 @@ class NodalComparison:
     __repr__ = __str__
 
     def plot(self) -> Any:
-        """Draw the deformed nodes of the run and of the other program, z over r (in three dimensions over x).
+        """Draw the deformed nodes of both programs, and the distance between them in colours.
+
+        The nodes are drawn as z over r, in three dimensions as z over x.
 
         Returns:
             The matplotlib figure.
         """
-        figure, axes = figures.figure()
-        reference = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - 2)))               # flat in three dimensions
+        figure, (both, apart) = figures.figure(2)
+        reference = np.pad(self.points, ((0, 0), (0, self.ours.shape[1] - self.points.shape[1])))     # a flat sheet
         for u, style, label in ((self.ours, {"marker": "o", "fillstyle": "none"}, "ours"),
                                 (self.theirs, {"marker": "x", "color": "k"}, "theirs")):
-            axes.plot(*(reference + u)[:, [0, -1]].T, linestyle="none", markersize=5, label=label, **style)
-        axes.set(xlabel="r" if self.ours.shape[1] == 2 else "x", ylabel="z",
-                 title=f"largest difference {self.maximum:.3g}")
-        axes.set_aspect("equal")
-        axes.legend(frameon=False)
+            both.plot(*(reference + u)[:, [0, -1]].T, linestyle="none", markersize=5, label=label, **style)
+        drawn = apart.scatter(*(reference + self.ours)[:, [0, -1]].T, c=self.difference, s=14, cmap="viridis")
+        k = int(np.argmax(self.difference))
+        apart.plot(*(reference + self.ours)[k, [0, -1]], "o", color="C3", markersize=10, fillstyle="none")
+        figure.colorbar(drawn, ax=apart, label="distance, ours to theirs")
+        for axes in (both, apart):
+            axes.set(xlabel="r" if self.ours.shape[1] == 2 else "x", ylabel="z", aspect="equal")
+        apart.set(title=f"largest difference {self.maximum:.3g}")
+        both.legend(frameon=False)
         return figure
 
 

@@ -234,6 +234,7 @@ def _heat_map(effects: Any, units: Units) -> str:
     """
     drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
     effects.plot(axes)
+    axes.set(xlabel=units.label("reference_length"))
     return "<h2>What changes the wall, and where</h2>" + page.figure(
         drawing, f"Change of the wall{f' in {units.length}' if units.length else ''} that the derivatives predict where"
                  f" a parameter changes by a tenth of {_RANGE}.")

@@ -66,10 +66,10 @@ class Effects:
     __repr__ = __str__
 
     def plot(self, axes: Any = None) -> Any:
-        """Draw a heat map of the derivatives, with a row for each parameter, over `coordinates`.
+        """Draw a heat map of the derivatives, with a row for each parameter, over `coordinates`; of one value, bars.
 
-        The colour is the change of the output quantity, to first order, if the parameter changes by a tenth of its
-        range, or of its start value if a bound is missing.
+        The colour, or the bar, is the change of the output quantity, to first order, if the parameter changes by a
+        tenth of its range, or of its start value if a bound is missing.
 
         Args:
             axes: matplotlib axes; default a new figure.
@@ -81,11 +81,15 @@ class Effects:
         axes = axes if axes is not None else new_axes()
         tenth, n = (self.jacobian * self.sizes / 10).T, len(self.names)
         most = abs(tenth).max() or 1.0
-        coordinates = self.coordinates if len(self.coordinates) > 1 else np.array([0.0, 1.0])
+        if len(self.coordinates) == 1:
+            axes.barh(range(n), tenth[:, 0], color=["C0" if change < 0 else "C3" for change in tenth[:, 0]])
+            axes.axvline(0.0, color="0.3", linewidth=0.8)
+            axes.set(yticks=range(n), yticklabels=self.names, xlabel=f"change of the {self.measure.replace('_', ' ')}")
+            axes.invert_yaxis()
+            return axes
+        coordinates = self.coordinates
         edges = np.concatenate([coordinates[:1], (coordinates[1:] + coordinates[:-1]) / 2, coordinates[-1:]])
-        drawn = axes.pcolormesh(edges, np.arange(n + 1) - 0.5,
-                                tenth if len(self.coordinates) > 1 else tenth.repeat(2, 1),
-                                cmap="RdBu_r", vmin=-most, vmax=most)
+        drawn = axes.pcolormesh(edges, np.arange(n + 1) - 0.5, tenth, cmap="RdBu_r", vmin=-most, vmax=most)
         axes.set(yticks=range(n), yticklabels=self.names, xlabel="reference length" if self.measure == "wall" else "")
         axes.invert_yaxis()
         axes.grid(False)
