@@ -92,7 +92,9 @@ with _optional():
 with _optional():
     from .extensions.space import checks as _space_checks
     from .extensions.space import crossing as _crossing_checks
+    from .extensions.space import edge_checks as _edge_checks
     from .extensions.space import mould_checks as _mould_checks
+    from .extensions.space import tool_checks as _tool_checks
     from .extensions.space.names import MESHES, TOOLS
     from .extensions.space.programme import WallProgramme, wall_programme
     _add(mesh, *MESHES)

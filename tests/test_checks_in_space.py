@@ -46,7 +46,8 @@ def test_an_edge_may_slide_in_the_plane_of_the_sheet():
 
 
 @pytest.mark.parametrize("kind, scale, words", [
-    ("box", 0.8, "the mould is wider than the sheet: its mouth is 0.205 mm or more away"), ("box", 0.96, None),
+    ("box", 0.8, "the mould is wider than the sheet: its mouth is 0.205 mm or more away"),
+    ("box", 0.96, "the mould is wider than the sheet: its mouth is 0.0"), ("box", 0.995, None),
     ("box", 1.0, None), ("box", 1.3, None), ("box", 16.0, "is 0.148 times as wide as the sheet: are"),
     ("file", 0.8, "the mould is wider than the sheet"), ("file", 1.0, None), ("file", 1.3, None),
     ("file", 4.0, "hangs past the end .*pressure = 1 is more than the 0.0541 MPa")])

@@ -49,11 +49,14 @@ def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, l
         The distances, shape (n,), length; infinity if the tool is not met within `limit`.
     """
     distance = np.zeros(len(points))
+    rows: np.ndarray = np.arange(len(points))
     for _ in range(1000):                                    # the gap to the tool is a safe advance
-        gap = -tool.signed_distance(points + distance[:, None] * directions)
-        if not np.any((gap > 1e-6 * limit / 100) & (distance < limit)):
+        gap = -tool.signed_distance(points[rows] + distance[rows, None] * directions[rows])
+        rows, gap = rows[gap > 1e-6 * limit / 100], gap[gap > 1e-6 * limit / 100]
+        distance[rows] = np.minimum(distance[rows] + gap, limit)
+        rows = rows[distance[rows] < limit]
+        if not len(rows):
             break
-        distance = np.minimum(distance + np.maximum(gap, 0.0), limit)
     return np.where(distance < limit, distance, np.inf)
 
 

@@ -11,7 +11,7 @@ sharp, and have different normals on their two sides.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,6 +63,32 @@ def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> 
         return np.repeat(unit(area_vectors(points, triangles))[:, None], 3, axis=1)
     groups = corner_groups(points, triangles, np.radians(crease))
     return fitted_normals(points, triangles, groups, np.radians(crease))[groups]
+
+
+def misfit(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> tuple[float, np.ndarray]:
+    """Return the misfit of normals to smooth edges over the turns there, and the place of the largest misfit.
+
+    Both are root mean squares, weighted with the areas of the triangles. The place has the shape (3,), length.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        normals: unit normals at the corners, shape (m, 3, 3).
+    """
+    m, area = len(triangles), area_vectors(points, triangles)
+    i, j = sides_of_edges(triangles)
+    s, k, t, l = i % m, i // m, j % m, j // m
+    turn = turns(unit(area), s, t)
+    ends = normals[s, k], normals[s, (k + 1) % 3]
+    jump = np.linalg.norm(ends[0] - normals[t, (l + 1) % 3], axis=1) + np.linalg.norm(ends[1] - normals[t, l], axis=1)
+    a, b = points[triangles[s, k]], points[triangles[s, (k + 1) % 3]]
+    found = np.abs(((ends[0] + ends[1]) * unit(b - a)).sum(1)) / 2
+    size = np.linalg.norm(area, axis=1)
+    weight = np.where((jump < _CONVERGED) & (turn > _COPLANAR), size[s] + size[t], 0.0)
+    if not weight.any():
+        return 0.0, points.mean(0)
+    worst = int(np.argmax(weight * found**2))
+    return float(np.sqrt(weight @ found**2 / (weight @ turn**2))), (a[worst] + b[worst]) / 2
 
 
 def turns(facet: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
@@ -199,45 +225,94 @@ def flat_directions(points: np.ndarray, triangles: np.ndarray, crease: float
     same = turn < np.maximum(_COPLANAR, 2 * (error[s] + error[t]))
     graph = coo_array((np.ones(same.sum()), (s[same], t[same])), shape=(m, m))
     region = connected_components(graph, directed=False)[1]
-    border = ~same & (turn < crease)
-    side, opposite = np.concatenate([i[border], j[border]]), np.concatenate([j[border], i[border]])
-    k, own = side // m, side % m
-    way = unit(corners[own, (k + 1) % 3] - corners[own, k])
-    borders = Borders(side, region[own], region[opposite % m], np.tile(turn[border], 2), np.cross(way, facet[own]))
+    borders = _borders(points, triangles, facet, region, turn, (i, j), ~same & (turn < crease))
     large = np.bincount(region) > 1
     rows = np.flatnonzero(large[borders.region])
     ratio = borders.turn[rows] / _turn_ahead(borders, rows)
-    straight = np.zeros(len(side), dtype=bool)
+    straight = np.zeros(len(borders.side), dtype=bool)
     straight[rows] = np.abs(ratio - 0.5) < _HALF_TURN
     bent = np.zeros(len(large), dtype=bool)
     bent[borders.region[~straight]] = True
-    return (np.where((large & ~bent)[region], region, -1), own[straight], k[straight], borders.away[straight])
+    ends = _borders(points, triangles, facet, region, turn, (i, j), ~same & (turn >= crease))
+    ruled = np.flatnonzero(large[ends.region] & bent[ends.region])
+    ruled = ruled[~_bends_behind(borders._replace(turn=np.where(straight, 0.0, borders.turn)), ends, ruled)]
+    side = np.concatenate([borders.side[straight], ends.side[ruled]])
+    return (np.where((large & ~bent)[region], region, -1), side % m, side // m,
+            np.concatenate([borders.away[straight], ends.away[ruled]]))
+
+
+def _borders(points: np.ndarray, triangles: np.ndarray, facet: np.ndarray, region: np.ndarray, turn: np.ndarray,
+             sides: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> Borders:
+    """Return some edges between regions, from both sides.
+
+    Args:
+        points: vertices, shape (n, 3), length.
+        triangles: vertex numbers, shape (m, 3).
+        facet: unit normals of the triangles, shape (m, 3).
+        region: region of each triangle, shape (m,).
+        turn: angles between the two triangles at k edges, shape (k,), radians.
+        sides: the two sides of these edges, shape (k,) each.
+        kept: mask of the edges that count, shape (k,).
+    """
+    m, (i, j) = len(triangles), sides
+    side, opposite = np.concatenate([i[kept], j[kept]]), np.concatenate([j[kept], i[kept]])
+    k, own = side // m, side % m
+    way = unit(points[triangles[own, (k + 1) % 3]] - points[triangles[own, k]])
+    return Borders(side, region[own], region[opposite % m], np.tile(turn[kept], 2), np.cross(way, facet[own]))
 
 
 def _turn_ahead(borders: Borders, rows: np.ndarray) -> np.ndarray:
     """Return for some borders the largest turn at the far side of the region beyond, shape (k,), radians; inf if none.
 
     Args:
-        borders: all borders, sorted by nothing.
+        borders: all borders.
         rows: numbers of the k borders.
     """
-    order = np.argsort(borders.region, kind="stable")
-    first = np.searchsorted(borders.region[order], borders.beyond[rows])
-    count = np.searchsorted(borders.region[order], borders.beyond[rows], side="right") - first
-    found, begin = np.zeros(len(rows)), 0
-    ends = np.cumsum(count)
-    while begin < len(rows):
-        end = max(begin + 1, int(np.searchsorted(ends, (ends[begin - 1] if begin else 0) + _PAIRS)))
-        part = np.arange(begin, end)
-        near = np.repeat(part, count[part])
-        far = order[np.arange(len(near)) + np.repeat(first[part] - (ends[part] - count[part] - ends[begin]
-                                                                    + count[begin]), count[part])]
+    found = np.zeros(len(rows))
+    for near, far in _pairs(borders.beyond[rows], borders.region):
         row = rows[near]
         ahead = (borders.beyond[far] != borders.region[row]) & (
             np.einsum("ni,ni->n", borders.away[far], borders.away[row]) > _AHEAD)
         np.maximum.at(found, near[ahead], borders.turn[far[ahead]])
-        begin = end
     return np.where(found > 0, found, np.inf)
+
+
+def _bends_behind(borders: Borders, ends: Borders, rows: np.ndarray) -> np.ndarray:
+    """Return the mask of sharp edges from which their region leads to a curved surface at its far side, shape (k,).
+
+    A region between two sharp edges, such as a facet of a cone, has no curvature from one to the other.
+
+    Args:
+        borders: all smooth borders; their turn is 0 where their region is straight.
+        ends: all sharp edges.
+        rows: numbers of the k sharp edges in `ends`.
+    """
+    found = np.zeros(len(rows), dtype=bool)
+    for near, far in _pairs(ends.region[rows], borders.region):
+        behind = (borders.turn[far] > 0) & (
+            np.einsum("ni,ni->n", borders.away[far], ends.away[rows[near]]) < -_AHEAD)
+        found[near[behind]] = True
+    return found
+
+
+def _pairs(wanted: np.ndarray, regions: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield all pairs (p, q) with wanted[p] equal to regions[q], as two arrays; not too many at once.
+
+    Args:
+        wanted: regions, shape (k,).
+        regions: regions of the borders, shape (b,).
+    """
+    order = np.argsort(regions, kind="stable")
+    first = np.searchsorted(regions[order], wanted)
+    count, begin = np.searchsorted(regions[order], wanted, side="right") - first, 0
+    ends = np.cumsum(count)
+    while begin < len(wanted):
+        end = max(begin + 1, int(np.searchsorted(ends, (ends[begin - 1] if begin else 0) + _PAIRS)))
+        part = np.arange(begin, end)
+        near = np.repeat(part, count[part])
+        start = first[part] - (ends[part] - count[part] - ends[begin] + count[begin])
+        yield near, order[np.arange(len(near)) + np.repeat(start, count[part])]
+        begin = end
 
 
 def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, crease: float) -> np.ndarray:

@@ -12,9 +12,9 @@ from ...mesh.nodes import nearest
 from ...physics.contact import Contact
 from ...physics.supports import Symmetry
 from ...scene.contact_checks import OTHER_UNIT
-from ...values.tolerances import LARGE_ERROR
 from .triangulated import Triangulated
 
+_INSIDE = 0.01             # distance of a held edge inside the mouth of a mould that is reported, over the width
 
 @register("start")
 def sizes(body: Any) -> Iterator[Finding]:
@@ -29,13 +29,13 @@ def sizes(body: Any) -> Iterator[Finding]:
     Yields:
         A finding for each such tool.
     """
-    for contact in _fixed(body.scene):
-        tool, sheet = contact.tool, _whole_extent(body.scene)
+    for contact in fixed_tools(body.scene):
+        tool, sheet = contact.tool, whole_extent(body.scene)
         file = isinstance(tool, Triangulated)
         wide, whole = float(_widths(tool).max()), float(sheet.max())
-        points, ahead = _nodes_and_direction(body.scene, contact)
+        points, ahead = nodes_and_direction(body.scene, contact)
         gap = float(-tool.signed_distance(points).max())
-        narrow = wide * OTHER_UNIT < whole and _is_cavity(tool, ahead)
+        narrow = wide * OTHER_UNIT < whole and is_cavity(tool, ahead)
         if narrow or wide > OTHER_UNIT * whole and (file or gap > whole / 2):
             advice = "is its file in another unit of length? Give solid a scale=..." if file else \
                 "are the units of length the same (mm and cm)?"
@@ -45,7 +45,7 @@ def sizes(body: Any) -> Iterator[Finding]:
 
 @register("scene")
 def narrow_sheets(body: Any) -> Iterator[Finding]:
-    """Find sheets whose edge lies inside the mouth of a mould, farther than 5 % of their width from its wall.
+    """Find sheets whose edge lies inside the mouth of a mould, farther than 1 % of their width from its wall.
 
     Args:
         body: the examined body, whose `scene` has the contacts.
@@ -58,9 +58,9 @@ def narrow_sheets(body: Any) -> Iterator[Finding]:
         tool = contact.tool
         if not tool.sized:
             continue
-        points, ahead = _nodes_and_direction(scene, contact)
+        points, ahead = nodes_and_direction(scene, contact)
         gap = float(_distances_at_mouth(tool, points, ahead).min())
-        if gap > LARGE_ERROR * _whole_extent(scene).max():
+        if gap > _INSIDE * whole_extent(scene).max():
             yield Finding("warning", repr(contact), f"the mould is wider than the sheet: its mouth is"
                           f" {body.format(gap, 'travel', 3)} or more away from the sheet on all sides, so the edge of"
                           f" the sheet is held in the air: use a wider sheet, or a narrower mould")
@@ -84,9 +84,9 @@ def narrow_moulds(body: Any) -> Iterator[Finding]:
     if not pressures or any(material.varies for material in scene.materials.values()):
         return
     held = [scene.mesh.nodes_of(s.on) for s in scene.supports if not isinstance(s, Symmetry)]
-    for face in dict.fromkeys(contact.on for contact in _fixed(scene)):
+    for face in dict.fromkeys(contact.on for contact in fixed_tools(scene)):
         contacts = [c for c in scene.contacts if c.direction is None and c.on == face]
-        points, ahead = _nodes_and_direction(scene, contacts[0])
+        points, ahead = nodes_and_direction(scene, contacts[0])
         ways = np.tile([0.0, 0.0, ahead], (len(points), 1))
         met = np.any([np.isfinite(free_distance(c.tool, points, ways, 100 * body.length)) for c in contacts], axis=0)
         if met.all() or not met.any():
@@ -106,13 +106,13 @@ def narrow_moulds(body: Any) -> Iterator[Finding]:
                           f" blown past the mould. Use a smaller sheet, or a mould with a wider flange")
 
 
-def _fixed(scene: Any) -> list[Contact]:
+def fixed_tools(scene: Any) -> list[Contact]:
     """Return the contacts of a flat sheet in three dimensions with fixed tools of finite size."""
     return [c for c in scene.contacts if scene.kinematics.components == 3 and scene.mesh.flat and c.direction is None
             and c.tool.sized]
 
 
-def _whole_extent(scene: Any) -> np.ndarray:
+def whole_extent(scene: Any) -> np.ndarray:
     """Return the extent along x and y of the whole sheet, of which a half or a quarter is modelled, shape (2,)."""
     cut = [any(plane.axis == axis for plane in scene.symmetry.planes) for axis in (0, 1)]
     return (1 + np.array(cut)) * scene.extent[:2]
@@ -126,7 +126,7 @@ def _widths(tool: Any) -> np.ndarray:
     return widths
 
 
-def _nodes_and_direction(scene: Any, contact: Contact) -> tuple[np.ndarray, float]:
+def nodes_and_direction(scene: Any, contact: Contact) -> tuple[np.ndarray, float]:
     """Return the nodes of the sheet, shape (n, 3), length, and the z of the unit normal out of a contact's face."""
     return np.unique(scene.mesh.nodes_of(contact.on), axis=0), scene.mesh.faces[contact.on]
 
@@ -140,7 +140,7 @@ def _distances_at_mouth(tool: Any, points: np.ndarray, ahead: float) -> np.ndarr
     return -tool.signed_distance(np.column_stack([points[:, :2], np.full(len(points), mouth)]))
 
 
-def _is_cavity(tool: Any, ahead: float) -> bool:
+def is_cavity(tool: Any, ahead: float) -> bool:
     """Return True if the middle of a tool is farther from the sheet than its rim; `ahead` is the z towards the tool."""
     points = tool.surface()[0]
     away = np.hypot(*(points[:, :2] - points[:, :2].mean(0)).T)

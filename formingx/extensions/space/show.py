@@ -52,12 +52,12 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
         camera = np.array([1.4, -2.6, 0.9] if not wall.flat else [0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
         size = np.ptp(wall.deformed_points, axis=0).max()
         lift = 0.004 * size * camera / np.linalg.norm(camera)           # else lines flicker
-        values = wall.at_nodes / wall.to_nodes(wall.reference_thickness)
+        values = wall.ratio                                 # of each triangle: means at nodes hide the thinnest
         faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
         with plotted(file) as plotter:
             for scale, shift in images:
                 surface = pyvista.PolyData(wall.deformed_points * scale + shift, faces)
-                surface["ratio"] = values
+                surface.cell_data["ratio"] = values
                 plotter.add_mesh(surface, **shading(values), specular=0.2, split_sharp_edges=False)
                 for line in lines:
                     plotter.add_mesh(pyvista.lines_from_points(line * scale + shift + lift), color="black",

@@ -228,7 +228,8 @@ class Swept(SolidTool):
 
         Args:
             file: path of the STL file.
-            wall: distance of the flat bottom below the lowest point of the profile, length, positive.
+            wall: distance of the flat bottom below the lowest point of the profile, length, positive. Also of the
+                outer side from the widest part of a profile that begins at a smaller radius, such as a bottle.
 
         Raises:
             InputError: the tool is extruded, or its profile does not lead from r > 0 to r = 0.
@@ -236,9 +237,12 @@ class Swept(SolidTool):
         outline, wall = self.profile.outline(), positive("to_stl: wall", wall)
         if self.kind == "extruded" or outline[-1, 0] != 0 or outline[0, 0] <= 0:
             raise InputError(f"to_stl: {self!r}: must be a mould revolved or round a box, its profile to end at r = 0")
-        low = outline[:, 1].min() - wall
+        low, (radius, height), widest = outline[:, 1].min() - wall, outline[0], outline[:, 0].max()
+        side = [[radius, low]]
+        if widest > radius:                                  # a bottle from its neck: outside its widest part
+            side = [[widest + wall, low], [widest + wall, max(height, outline[:, 1].max())]]
         (top, upper), (back, lower) = (self._swept(np.array(line)) for line in (
-            outline, [[0.0, low], [outline[0, 0], low], outline[0]]))
+            outline, [[0.0, low], *side, outline[0]]))
         points, triangles = merged(np.vstack([top, back]), np.vstack([upper, lower + len(top)]))
         write_stl(points + self.shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
 

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
+from functools import cached_property
 
 import numpy as np
 
 from ...errors import InputError, check_type, direction, file_path, finite, positive
 from ...io.stl import volume
 from .bodies import separate_bodies
-from .corner_normals import corner_normals
+from .corner_normals import corner_normals, misfit
 from .patches import PatchSurface, area_vectors
 from .solid_tool import SolidTool, nearest_of
 from .step_reader import read_step
@@ -97,6 +98,18 @@ class Triangulated(SolidTool):
         under = inner & (draft < -0.01)
         return {"undercut_area": float(area[under].sum()),
                 "min_draft": float(draft[inner & ~under].min(initial=90.0))}
+
+    @cached_property
+    def roughness(self) -> tuple[float, np.ndarray]:
+        """Misfit of the normals of an STL file, over the angles between triangles, and the place of the largest one.
+
+        The misfit is that of the equation of smooth edges (`formingx.extensions.space.corner_normals`), as a root mean
+        square over their area. It is 0 for flat triangles and for exact normals.
+        """
+        if self._exact_normals or self.crease == 0:
+            return 0.0, self.middle
+        ratio, place = misfit(self._points, self._triangles, self._normals)
+        return ratio, place + self.shift
 
     def _covered(self, middle: np.ndarray) -> np.ndarray:
         """Return the mask of the triangles that lie inside another body of the tool, shape (m,).

@@ -1,0 +1,115 @@
+"""Scenes of sheets that no one means, and tools that cannot be resolved, are told before the run."""
+
+import numpy as np
+import pytest
+from test_solid_surfaces import ball
+
+import formingx as fx
+from formingx.extensions.space.triangulated import Triangulated
+from formingx.io.stl import write_stl
+
+BOX = fx.tools.box(half=(10.0, 14.0), depth=8.0, corner=3.0, fillet=2.0, lip=1.0)
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    name = tmp_path_factory.mktemp("tools") / "box.stl"
+    BOX.to_stl(name, wall=3.0)
+    return fx.tools.solid(name)
+
+
+def upside_down(tool):
+    points, triangles = tool.surface()
+    turned = points * (1, -1, -1)
+    return Triangulated(turned - (0, 0, turned[:, 2].max()), triangles, "turned.stl")
+
+
+def texts(tool, size=1.5, whole=False, target=None, **options):
+    """Findings of the check of a sheet over a mould."""
+    part = "whole" if whole else "quarter"
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(24.0, 32.0, corner=4.0, part=part), size=size)
+    supports = [fx.SimplySupported("rim"), *([] if whole else [fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])]
+    contacts = options.pop("contacts", None) or [fx.Contact("bottom", tool, "stick", name="mould")]
+    scene = fx.Scene(mesh=sheet, thickness=options.pop("thickness", 0.5), materials=fx.NeoHookean(c10=1.0),
+                     supports=supports, loads=[fx.Pressure("top")], contacts=contacts)
+    return [finding.text for finding in fx.check(scene, targets=[target or fx.pressure(0.1)]).findings]
+
+
+def test_a_sheet_on_its_mould_is_healthy(file):
+    assert texts(BOX) == [] and texts(file) == [] and texts(file, whole=True) == []
+
+
+@pytest.mark.parametrize("change, text", [
+    (lambda tool: tool.moved(z=-0.5), "the mould lies 0.5 beyond the held edge"),
+    (lambda tool: tool.moved(z=-6.0), "the mould lies 6 beyond the held edge"),
+    (lambda tool: tool.moved(x=9.0), "a part of the held edge, as at .* lies over the cavity"),
+    (upside_down, "is its file upside down")])
+def test_moulds_that_are_not_under_the_sheet(file, change, text):
+    import re
+    found = texts(change(file), whole=True)
+    assert any(re.search(text, finding) for finding in found), found
+
+
+def test_a_plug_that_meets_the_held_edge():
+    plug = fx.tools.box(half=(11.0, 15.0), depth=20.0, corner=4.0, fillet=2.0, draft=0.0, mouth=20.5, plug=True)
+    narrow, wide = plug, fx.tools.box(half=(13.0, 17.0), depth=20.0, corner=4.0, fillet=2.0, mouth=20.5, plug=True)
+    contacts = [[fx.Contact("top", tool, "stick", direction=(0, 0, -1), name="plug")] for tool in (narrow, wide)]
+    assert not any("give way" in text for text in texts(None, contacts=contacts[0], target=fx.travel(6.0)))
+    found = texts(None, contacts=contacts[1], target=fx.travel(6.0))
+    assert any("after a travel of" in text and "cannot give way" in text for text in found), found
+
+
+def test_files_whose_triangles_are_noisy_or_miss_their_edges(tmp_path):
+    points, triangles = ball(16)
+    smooth = Triangulated(points, triangles, "ball")
+    assert smooth.roughness[0] < 0.01
+    noise = np.random.default_rng(1).normal(size=points.shape)
+    assert Triangulated(points + 2e-3 * noise, triangles, "ball").roughness[0] > 0.05
+    write_stl(12 * (points + 2e-3 * noise) * (1, 1, 0.4) - (0, 0, 5), triangles, tmp_path / "noisy.stl")
+    found = texts(fx.tools.solid(tmp_path / "noisy.stl"))
+    assert any("do not resolve its surface" in text for text in found), found
+    flat = texts(fx.tools.solid(tmp_path / "noisy.stl", crease=0))
+    assert not any("do not resolve" in text for text in flat)
+
+
+@pytest.mark.parametrize("friction", ["stick", 0.2])
+def test_fillets_below_the_triangles(file, friction):
+    def found(size):
+        return texts(None, size=size, contacts=[fx.Contact("bottom", file, friction, name="mould")])
+    assert any("fillets of radius 2" in text for text in found(2.6)) and found(1.5) == []
+
+
+def test_thickness_rougher_than_the_triangles():
+    def stripes(x, y):
+        return 0.5 + 0.3 * np.sin(5.0 * x)
+    assert any("the thickness varies within the triangles" in text for text in texts(BOX, thickness=stripes))
+    assert texts(BOX, thickness=lambda x, y: 0.5 + 0.01 * x) == []
+
+
+def test_a_bottle_from_its_neck_is_written_as_a_closed_mould(tmp_path):
+    """The outer side of the file lies outside the widest part of the profile, and does not cross the cavity."""
+    profile = fx.tools.bottle(radius=1.0, height=2.0, neck=0.45, shoulder=0.5, neck_height=0.3)
+    mould = fx.tools.revolved(profile)
+    mould.to_stl(tmp_path / "bottle.stl", wall=0.3)
+    tool, rng = fx.tools.solid(tmp_path / "bottle.stl"), np.random.default_rng(3)
+    low, high = profile.bounds
+    x = rng.uniform((-1.1, -1.1, low[1] - 0.1), (1.1, 1.1, high[1] - 0.2), (6000, 3))
+    x = x[np.hypot(*x[:, :2].T) < 1.1]                        # nearer to the cavity than to the outer side
+    near = np.abs(mould.signed_distance(x)) < 0.15
+    np.testing.assert_allclose(tool.signed_distance(x)[near], mould.signed_distance(x)[near], atol=5e-3)
+
+
+def test_the_thinnest_triangle_is_drawn(monkeypatch, tmp_path):
+    """A mean at nodes would be thicker than the minimum wall of the part."""
+    from formingx import figures
+    drawn, pyvista = [], figures.pyvista()
+    monkeypatch.setattr(pyvista.Plotter, "add_mesh", lambda self, mesh, **options: drawn.append((mesh, options)))
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(24.0, 32.0, corner=4.0, part="quarter"), size=3.0)
+    scene = fx.Scene(mesh=sheet, thickness=0.5, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("top")],
+                     supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")],
+                     contacts=[fx.Contact("bottom", BOX, "stick")])
+    path = fx.trace(scene, until=fx.pressure(0.1), progress=False)
+    path.view3d(tmp_path / "tray.png")
+    mesh, options = drawn[0]
+    assert mesh[options["scalars"]].min() == pytest.approx(path.part().min_wall / 0.5, rel=1e-12)
+    assert options["clim"][0] == pytest.approx(path.part().min_wall / 0.5, rel=1e-9)
