@@ -56,7 +56,7 @@ def test_moulds_wider_or_narrower_than_the_sheet(moulds, kind, scale, words):
     if words is None:
         assert report.healthy
     else:
-        finding, = report.findings
+        finding, = (finding for finding in report.findings if "has fillets of radius" not in finding.text)
         assert finding.severity == "warning" and finding.about.startswith("Contact('bottom'")
         assert re.search(words, finding.text), finding.text
 
