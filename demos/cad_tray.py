@@ -59,9 +59,9 @@ def is_sharp(gmsh, edge):
     return abs(abs(a @ b) - 1) > 1e-3
 
 
-def draw_mould(step, stl):
-    """Write the mould as STEP, and as STL with triangles that turn by at most 15 degrees."""
-    options = {"General.NumThreads": 1.0, "Mesh.MeshSizeFromCurvature": 24.0, "Mesh.MeshSizeMax": 15.0}
+def draw_mould(step, stl, angle):
+    """Write the mould as STEP, and as STL with triangles that turn by at most an angle, degrees."""
+    options = {"General.NumThreads": 1.0, "Mesh.MeshSizeFromCurvature": 360.0 / angle, "Mesh.MeshSizeMax": 15.0}
     with with_gmsh.model("tray", options) as gmsh:
         occ, bottom = gmsh.model.occ, -DEPTH - 10
         block = occ.addBox(-80, -60, bottom, 160, 120, -bottom)
@@ -138,14 +138,15 @@ def main():
     options.add_argument("--size", type=float, default=5.0, help="size of the triangles of the first mesh, mm")
     options.add_argument("--adapted", type=int, default=4, help="largest number of meshes that are then adapted")
     args = options.parse_args()
-    size, more, disc, share = (12.0, 0, 0.2, 0.2) if args.quick else (args.size, args.adapted, 0.05, 1.0)
+    size, more, disc, share = (12.0, 0, 0.25, 0.1) if args.quick else (args.size, args.adapted, 0.05, 1.0)
+    angle = 30.0 if args.quick else 15.0
     if COMM.rank == 0:
         args.out.mkdir(parents=True, exist_ok=True)
-        draw_mould(args.out / "mould.step", args.out / "mould.stl")
+        draw_mould(args.out / "mould.step", args.out / "mould.stl", angle)
         ball_of_triangles(args.out / "ball.stl", 0.35)
     COMM.Barrier()
-    moulds = {"step": fx.tools.solid(args.out / "mould.step"), "stl": fx.tools.solid(args.out / "mould.stl"),
-              "flat": fx.tools.solid(args.out / "mould.stl", crease=0)}
+    moulds = {"step": fx.tools.solid(args.out / "mould.step", angle=angle),
+              "stl": fx.tools.solid(args.out / "mould.stl"), "flat": fx.tools.solid(args.out / "mould.stl", crease=0)}
     balls = {"analytic": fx.tools.revolved(fx.tools.sphere(radius=0.35)),
              "stl80": fx.tools.solid(args.out / "ball.stl")}
     summary: dict = {"disc": {name: push(ball, disc) for name, ball in balls.items()}}
