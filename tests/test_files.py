@@ -501,8 +501,8 @@ def test_a_part_that_recovers_has_its_height_over_time():
 
 def test_labels_of_all_stages_have_room_in_an_animation(formed, monkeypatch):
     """The force of the second stage has longer numbers than the pressure of the first."""
-    figures, plain = [], plots.figure
-    monkeypatch.setattr(plots, "figure", lambda *size, **more: figures.append(plain(*size, **more)) or figures[-1])
+    figures, plain = [], animation.figures.figure
+    monkeypatch.setattr(animation.figures, "figure", lambda *size, **more: figures.append(plain(*size, **more)) or figures[-1])
     curves = {("pole_height", "pressure"): ([0, 1], [0, 1]), ("process_time", "mould_force"): ([0, 1], [0, 12345.6])}
     shape = formed.profile()
     animation._draw([shape] * 2, [[]] * 2, [(names, (0, 0)) for names in curves], curves, True, fx.Units())
