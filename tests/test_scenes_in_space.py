@@ -113,3 +113,15 @@ def test_the_thinnest_triangle_is_drawn(monkeypatch, tmp_path):
     mesh, options = drawn[0]
     assert mesh[options["scalars"]].min() == pytest.approx(path.part().min_wall / 0.5, rel=1e-12)
     assert options["clim"][0] == pytest.approx(path.part().min_wall / 0.5, rel=1e-9)
+
+
+@pytest.mark.parametrize("friction, told", [("none", True), ("stick", False)])
+def test_forces_that_miss_the_pressure_are_told(friction, told):
+    """Reactions of a cup on coarse triangles without friction are a tenth too small; those under stick are exact."""
+    cup = fx.tools.revolved(fx.Tool([(1.5, 0.0), (1.0, 0.0), (1.0, -0.8), (0.0, -0.8)], [0.0, 0.0, 0.12, 0.0]))
+    sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=0.1)
+    scene = fx.Scene(mesh=sheet, thickness=0.01, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("top")],
+                     supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")],
+                     contacts=[fx.Contact("bottom", cup, friction)])
+    found = fx.trace(scene, until=fx.pressure(0.36), progress=False).findings()
+    assert any("miss the resultant of the pressure by" in finding.text for finding in found) == told

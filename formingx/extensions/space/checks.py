@@ -4,16 +4,19 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
+from dolfinx import la
 
 from ... import _compat
-from ...findings import Finding, register
+from ...findings import Finding, percent, register
 from ...mesh.nodes import nearest
 from ...physics.supports import Symmetry
-from ...ranks import gathered
+from ...ranks import combined, gathered
 from ...tools.pieces import Arc
 from ...values.tolerances import NEGLIGIBLE
 from .solid_tool import Swept
 from .surface import smaller_stress
+
+_LOST_PRESSURE = 0.02      # share of the resultant of the pressure that supports and tools may miss
 
 _LARGE_WALL_ERROR = 0.2
 """Estimated error of the minimum wall over this wall above which a run warns of it."""
@@ -60,6 +63,43 @@ def error_of_minimum_wall(path: Any) -> Iterator[Finding]:
         yield Finding("warning", "wall", f"The minimum wall, {wall.wall[k]:.3g} at (x, y, z) = ({place}), is too large"
                       f" by about {error:.2g}: the triangles there are too coarse for it. Use smaller triangles, or"
                       f" trace(..., adapt_mesh={{'error': 0.1}}).")
+
+
+@register("end")
+def lost_pressure(path: Any) -> Iterator[Finding]:
+    """Find a sliding sheet whose supports and tools do not balance the pressure in the last state; collective.
+
+    The tangential part of the pressure on nodes that slide is left out (`pressure_on_tools`). On coarse fillets this
+    part has a resultant.
+
+    Args:
+        path: the computed `Path`.
+
+    Yields:
+        A finding if 2 % of the resultant of the pressure or more is left out.
+    """
+    problem = path.problem
+    works = getattr(problem.forms, "pressure_works", None)
+    if not works:
+        return
+    forms, resultants = problem.forms, []
+    vectors, numbers = forms.space.sub(0).collapse()
+    own = np.asarray(numbers).reshape(-1, 3)[:vectors.dofmap.index_map.size_local]
+    with problem.state_context(path.last):
+        forms.refresh()
+        for works_of_one_kind in zip(*works):
+            form = forms.compile(sum(works_of_one_kind))
+            vector = la.vector(forms.space.dofmap.index_map, forms.space.dofmap.index_map_bs)
+            values = _compat.assemble_vector(vector, form)
+            resultants.append(combined(problem.comm, values[own].sum(0)))
+    lost, whole = resultants
+    planes = [plane.axis for plane in path.scene.symmetry.planes]
+    lost[planes] = whole[planes] = 0.0                        # balanced by the mirror image
+    share = float(np.linalg.norm(lost)) / max(float(np.linalg.norm(whole)), 1e-300)
+    if share > _LOST_PRESSURE:
+        yield Finding("warning", "pressure", f"the forces on supports and tools miss the resultant of the pressure by"
+                      f" {percent(share)}: where the sheet slides, its triangles are too coarse for the fillets of the"
+                      f" tools. Use smaller triangles there, or adapt_mesh=True, before you use a force.")
 
 
 @register("start")

@@ -52,6 +52,8 @@ class Surface(Formulation):
 
     singular_unloaded = True
     _on_tools: PressureOnTools | None = None
+    pressure_works: list[tuple[Any, Any]] = []
+    """For each pressure on a sliding sheet the virtual work of its removed tangential part, and of all of it (UFL)."""
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
         """Return the reference normal of a face of the surface, and the UFL measure of integrals over the surface.
@@ -76,10 +78,13 @@ class Surface(Formulation):
         if not pressures or all(contact.sticks for contact in self.scene.contacts):
             return residual, by_control, by_time
         self._on_tools = PressureOnTools(self)
+        self.pressure_works = []
         for load, value in pressures:
             face = body.face(load.on, load.quadrature_degree)
             area = self.scene.kinematics.area_vector(self.u, self.X, face.normal)
-            work = self._on_tools.work(load.share(self) * value, area)
+            applied = load.share(self) * value
+            work = self._on_tools.work(applied, area)
+            self.pressure_works.append((work, applied * ufl.inner(area, self.test_displacement()) * face.measure))
             residual -= self._scale * work
             if load.driven:
                 by_control -= self._scale * ufl.diff(work, self._control)
