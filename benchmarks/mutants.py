@@ -79,7 +79,7 @@ MUTANTS = [Mutant(*row) for row in [
      "return -1.002 * float(combined(self.comm, left, MPI.SUM))", "compression closed_forms"),
     ("problem/problem.py", "out.array_w += (control - 1) * stage.unbalanced",
      "out.array_w += (control - 0.5) * stage.unbalanced", "process"),
-    ("problem/stages.py", "self.history_variables, self._predicted = variables, predicted",
+    ("problem/problem.py", "self.history_variables, self._predicted = variables, predicted",
      "self._predicted = predicted", "details"),
     ("forms/admissible.py", "> 0))\n                   for", "> -0.5))\n                   for", "admissible"),
     ("forms/constraints.py", "active * row for (_, row), active", "row for (_, row), active", "process"),

@@ -13,7 +13,7 @@ import formingx as fx
 from formingx.checks import parallel
 from formingx.checks.expected_stretch import expected_stretches
 from formingx.checks.scripts import check_script
-from formingx.checks.sizes import Body
+from formingx.checks.sizes import SizedBody
 from formingx.materials.inflation import FreeInflation, first_peak
 from formingx.problem.problem import Problem
 
@@ -458,7 +458,7 @@ def test_expected_stretch_in_a_conical_mould():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.5, elements=(8, 1)), materials=fx.NeoHookean(c10=0.4),
                      supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], loads=[fx.Pressure("bottom")],
                      contacts=[fx.Contact("top", fx.tools.cup(radius=10.0, depth=5.0, mouth=0.5, draft=45.0), "none")])
-    (_, stretch), = expected_stretches(Body(scene, [], [], fx.Units()))
+    (_, stretch), = expected_stretches(SizedBody(scene, [], [], fx.Units()))
     assert stretch == pytest.approx(np.sqrt((5**2 + (5 + 10) * np.hypot(5, 5)) / 10**2), rel=1e-6)
 
 

@@ -9,7 +9,7 @@ from reference.reduced_contact import ReferencePoints
 
 import formingx as fx
 from formingx.contact.gap_closures import crossing, gap_closures
-from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame
+from formingx.extensions.contact_events.reduced_contact import CondensedPoints, ToolFrame
 from formingx.physics.contact_law import ContactStatus
 from formingx.physics.penalty import Law
 
@@ -25,7 +25,7 @@ def system(seed):
         C[:2], C[:, :2] = 0.0, 0.0
     friction = random.choice([np.inf, 0.3, 0.1, 0.0], m)
     reference = ReferencePoints(friction, np.full(m, 1e-3), random.random(m) < 0.3, S, C)
-    points = Points([SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((m, 2)))], 0, 0, None)
+    points = CondensedPoints([SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((m, 2)))], 0, 0, None)
     points.friction, points.elastic_slip, points._pulls = friction, reference.elastic_slip, reference.pulls
     points._S, points._C = S, C
     normal = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -111,7 +111,7 @@ def test_the_frame_of_points_is_that_of_array_operations(pulls):
     frames = []
     for kind in (Law, _Arrays):
         law = kind(tool, np.inf, k, 1e-2, 1e-3, shift, pulls)
-        points = Points([SimpleNamespace(comm=MPI.COMM_SELF, points=x, law=law, scale=scale)], 0, 0, None)
+        points = CondensedPoints([SimpleNamespace(comm=MPI.COMM_SELF, points=x, law=law, scale=scale)], 0, 0, None)
         points._mine, points._rows = points._located([(0, 0, i) for i in range(n)])
         frames.append(points.tool_frame(x, force))
     for a, b in zip(*frames, strict=True):

@@ -15,8 +15,8 @@ from formingx.contact.step_limit import TrialStep
 from formingx.extensions.contact_events.event_sequence import ContactEventSequence
 from formingx.extensions.contact_events.path_segment import PathSegment
 from formingx.extensions.contact_events.prediction import ContactEventPredictor
-from formingx.extensions.contact_events.reduced_contact import Points, ToolFrame
-from formingx.extensions.contact_events.response import Response
+from formingx.extensions.contact_events.reduced_contact import CondensedPoints, ToolFrame
+from formingx.extensions.contact_events.response import BodyResponse
 from formingx.physics.contact_law import ContactStatus
 from formingx.problem.problem import Problem
 
@@ -36,7 +36,7 @@ print(fx.__file__, path.counts.steps, *path.profile().thickness)
 def response_at(curve, state):
     """Return the linearised response of the body ahead of a state of a curve."""
     assert curve.factorise_one_sided(state)
-    return Response(curve, state, *(curve.problem.x.duplicate() for _ in range(2)))
+    return BodyResponse(curve, state, *(curve.problem.x.duplicate() for _ in range(2)))
 
 
 def test_contact_events_in_one_step():
@@ -126,7 +126,7 @@ def test_sliding_points_move_as_in_the_tangent():
 def test_status_rates_of_a_point_that_sticks_slides_or_separates(before, force, moves, after, rate):
     """A point of unit compliance with mu = 0.3; forces, motions and rates are (normal, tangential)."""
     face = SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((1, 2)))
-    points = Points([face], 0, 0, None)
+    points = CondensedPoints([face], 0, 0, None)
     points._C, points._S, points._pulls = np.eye(2), np.zeros((1, 2, 2)), np.zeros(1, dtype=bool)
     points.friction, points.elastic_slip = np.array([0.3]), np.zeros(1)
     near = ToolFrame(np.array([[1.0, 0.0]]), np.array([[0.0, 1.0]]), np.zeros(1), np.zeros(1))
@@ -265,7 +265,7 @@ def test_forces_of_sticking_sliding_and_open_points_together():
     """Five points on tilted tools, of one elastic body: prescribed motions, Coulomb's law and the compliance hold."""
     random = np.random.default_rng(4)
     angle, half = random.uniform(0, 6, 5), random.uniform(-1, 1, (10, 10))
-    points = Points([SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((5, 2)))], 0, 0, None)
+    points = CondensedPoints([SimpleNamespace(comm=MPI.COMM_SELF, points=np.zeros((5, 2)))], 0, 0, None)
     points._C, points._S, points._pulls = half @ half.T + np.eye(10), np.zeros((5, 2, 2)), np.zeros(5, dtype=bool)
     points.friction, points.elastic_slip = np.array([np.inf, 0.3, 0.2, 0.0, 0.3]), np.full(5, 1e-3)
     near = ToolFrame(np.column_stack([np.cos(angle), np.sin(angle)]), np.column_stack([-np.sin(angle), np.cos(angle)]),

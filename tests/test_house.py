@@ -1,7 +1,10 @@
-"""The structure of the package: the order of folders in imports, without circles."""
+"""The structure of the package: the order of folders in imports, without circles; classes and files of a size to read."""
 
 import ast
 import functools
+import io
+import tokenize
+from collections import Counter
 
 from conftest import ROOT
 
@@ -89,6 +92,24 @@ def test_private_names_are_not_imported():
              if isinstance(node, ast.ImportFrom) and node.level and node.module for alias in node.names
              if alias.name.startswith("_")}
     assert found == set()
+
+
+def code_lines(file):
+    """Number of lines with a token that is no comment or docstring."""
+    said = {n for node in ast.walk(tree_of(file)) if isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant)
+            and isinstance(node.value.value, str) for n in range(node.lineno, node.end_lineno + 1)}
+    blank = {tokenize.COMMENT, tokenize.NL, tokenize.NEWLINE, tokenize.INDENT, tokenize.DEDENT, tokenize.ENDMARKER}
+    return len({n for token in tokenize.generate_tokens(io.StringIO(file.read_text()).readline)
+                if token.type not in blank for n in range(token.start[0], token.end[0] + 1)} - said)
+
+
+def test_no_file_has_many_lines_of_code():
+    assert {name_of(file): n for file in FILES if (n := code_lines(file)) > 450} == {}
+
+
+def test_no_class_name_is_defined_twice():
+    names = Counter(node.name for file in FILES for node in ast.walk(tree_of(file)) if isinstance(node, ast.ClassDef))
+    assert {name for name, n in names.items() if n > 1} == set()
 
 
 def members(tree):

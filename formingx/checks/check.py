@@ -12,7 +12,7 @@ from ..solve.branches import ANOTHER_PATH
 from ..solve.stage import Stage, plan
 from ..units import NONE, Units
 from . import end_of_run, parallel, promised_walls, ranges, scenes, tool_contact, vents
-from .sizes import Body
+from .sizes import SizedBody
 
 # the imported modules register their checks
 __all__ = ["Report", "before_run", "check", "end_of_run", "parallel", "promised_walls", "ranges", "scenes",
@@ -89,7 +89,7 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
         check_type("check: targets: target", target, Target, "a target, such as pole_stretch(3)")
     for stage in stages:
         check_type("check: stages: stage", stage, Stage, "a formingx.Stage")
-    body = Body(scene, targets, stages, units)
+    body = SizedBody(scene, targets, stages, units)
     return Report([*findings_at("scene", body), *findings_at("start", body), *_overlaps(scene, targets, stages)])
 
 
@@ -117,4 +117,4 @@ def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[St
     Returns:
         The findings, the worst first; empty for a sound scene.
     """
-    return findings_at("start", Body(scene, targets, stages, NONE))
+    return findings_at("start", SizedBody(scene, targets, stages, NONE))

@@ -13,7 +13,7 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
     the square root of the areal draw ratio.
 
     Args:
-        body: the `Body` to be checked.
+        body: the `SizedBody` to be checked.
 
     Yields:
         Pairs (target or mould as text, stretch).

@@ -4,7 +4,7 @@ from collections.abc import Iterator
 
 from ..findings import Finding, register
 from ..scene.scene import Scene
-from .sizes import Body
+from .sizes import SizedBody
 
 WITHOUT_GAIN = 1_150_000
 """Number of unknowns up to which an iteration on two ranks takes as long as on one (benchmarks/ranks.py)."""
@@ -29,7 +29,7 @@ def unknowns(scene: Scene) -> int:
 
 
 @register("start")
-def _ranks(body: Body) -> Iterator[Finding]:
+def _ranks(body: SizedBody) -> Iterator[Finding]:
     """Report a run on several ranks with so few unknowns that one rank is as fast."""
     size, number = body.scene.mesh.comm.size, unknowns(body.scene)
     if size > 1 and number < WITHOUT_GAIN:

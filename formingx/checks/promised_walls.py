@@ -6,11 +6,11 @@ from collections.abc import Iterator
 
 from ..findings import Finding, register
 from ..mesh.contact_columns import is_thick_sheet
-from .sizes import Body
+from .sizes import SizedBody
 
 
 @register("start")
-def walls(body: Body) -> Iterator[Finding]:
+def walls(body: SizedBody) -> Iterator[Finding]:
     """Report sheets on tools whose walls may miss the accuracy that `accuracy=` promises (docs/accuracy.md)."""
     mesh = body.scene.mesh
     for text in mesh.inaccurate:

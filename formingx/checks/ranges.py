@@ -11,7 +11,7 @@ from ..physics.loads import CentrifugalLoad, Gravity
 from ..values.table import Table
 from ..values.tolerances import LARGEST_FRICTION, ROUND_OFF
 from .mould_side import moulds, sign_towards
-from .sizes import LARGEST_LOAD, Body
+from .sizes import LARGEST_LOAD, SizedBody
 
 _LONGEST_IN_METRES = 5.0        # longest body whose length may be in metres
 _SHORTEST_IN_MICROMETRES = 1e3  # shortest body whose length may be in micrometres
@@ -21,7 +21,7 @@ _LARGEST_MODULUS_IN_MM = _LARGEST_MODULUS / 1e6   # for a length in mm: 100 GPa 
 
 
 @register("start")
-def moduli(body: Body) -> Iterator[Finding]:
+def moduli(body: SizedBody) -> Iterator[Finding]:
     """Report shear moduli that no polymer has in one of the usual systems of units."""
     for layer, value in body.moduli.items():
         in_mm = _LONGEST_IN_METRES < body.length < _SHORTEST_IN_MICROMETRES
@@ -34,7 +34,7 @@ def moduli(body: Body) -> Iterator[Finding]:
 
 
 @register("start")
-def friction(body: Body) -> Iterator[Finding]:
+def friction(body: SizedBody) -> Iterator[Finding]:
     """Report coefficients of friction above 5; rubber on dry steel reaches 4."""
     for contact in body.scene.contacts:
         if contact.sticks:
@@ -48,7 +48,7 @@ def friction(body: Body) -> Iterator[Finding]:
 
 
 @register("start")
-def weight(body: Body) -> Iterator[Finding]:
+def weight(body: SizedBody) -> Iterator[Finding]:
     """Report weights and centrifugal loads that are far too large or too small for the shear modulus of the body."""
     for load in body.scene.loads:
         if not isinstance(load, Gravity | CentrifugalLoad) or load.value is None:
@@ -66,7 +66,7 @@ def weight(body: Body) -> Iterator[Finding]:
 
 
 @register("start")
-def pressures(body: Body) -> Iterator[Finding]:
+def pressures(body: SizedBody) -> Iterator[Finding]:
     """Report a scene whose pressures all push the body away from its moulds."""
     acting = [pressure for pressure in body.pressures() if pressure.item is not None and pressure.value]
     found = moulds(body.scene) if acting else []

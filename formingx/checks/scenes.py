@@ -14,14 +14,14 @@ from ..scene.scene import Scene
 from ..scene.target_checks import unreachable
 from ..tools.shapes import Arc
 from ..values.tolerances import MEASURED_ACCURACY, ROUND_OFF
-from .sizes import Body
+from .sizes import SizedBody
 
 _ASPECT_RATIO = 110.0       # longest edge over height; discs with 100 give correct results in benchmarks/extremes.py
 _ELEMENTS_PER_FILLET = 2.0  # smallest number of elements along a fillet
 
 
 @register("scene")
-def _driven(body: Body) -> Iterator[Finding]:
+def _driven(body: SizedBody) -> Iterator[Finding]:
     """Report a scene in which no load, support or tool can be controlled."""
     if not body.scene.drivable:
         yield Finding("warning", "loads", "nothing is driven: only a process of stages with a duration can run; give"
@@ -30,7 +30,7 @@ def _driven(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _edges(body: Body) -> Iterator[Finding]:
+def _edges(body: SizedBody) -> Iterator[Finding]:
     """Report edges without a support of a sheet in three dimensions.
 
     A flat membrane has no stiffness normal to its plane.
@@ -44,7 +44,7 @@ def _edges(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _symmetry(body: Body) -> Iterator[Finding]:
+def _symmetry(body: SizedBody) -> Iterator[Finding]:
     """Report symmetries of boundaries that are curved or inclined: they lie in no plane of symmetry."""
     near = SAME_PLACE * float(max(body.scene.extent))
     for support in body.scene.supports:
@@ -59,7 +59,7 @@ def _symmetry(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _hinged_edges(body: Body) -> Iterator[Finding]:
+def _hinged_edges(body: SizedBody) -> Iterator[Finding]:
     """Report sharp edges of tools with friction at the edge of a hinged face.
 
     The face rotates, so its edge leaves the tool, unless it sticks. The direction of the contact is round-off there.
@@ -81,7 +81,7 @@ def _hinged_edges(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _elements(body: Body) -> Iterator[Finding]:
+def _elements(body: SizedBody) -> Iterator[Finding]:
     """Report triangles whose longest edge is more than 110 times their height on that edge."""
     if not body.scene.model.solid:
         return
@@ -93,7 +93,7 @@ def _elements(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _locking(body: Body) -> Iterator[Finding]:
+def _locking(body: SizedBody) -> Iterator[Finding]:
     """Report elements of a shape with which the finite elements of the scene's model lock."""
     found = body.scene.model.locking(body.scene.mesh)
     if found is not None:
@@ -101,7 +101,7 @@ def _locking(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _layers(body: Body) -> Iterator[Finding]:
+def _layers(body: SizedBody) -> Iterator[Finding]:
     """Report a thick layer with one element through it, which cannot bend, and layers of very different shear modulus.
 
     Elements of a soft layer that are long compared with its thickness misrepresent its shear at a rim. In a hinged
@@ -137,7 +137,7 @@ def _layers(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _fillets(body: Body) -> Iterator[Finding]:
+def _fillets(body: SizedBody) -> Iterator[Finding]:
     """Report fillets of a tool whose arc is shorter than two elements of the face that touches it."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
@@ -168,7 +168,7 @@ def _n_owned(scene: Scene, facets: np.ndarray) -> int:
 
 
 @register("scene")
-def _contact_penalties(body: Body) -> Iterator[Finding]:
+def _contact_penalties(body: SizedBody) -> Iterator[Finding]:
     """Report contact penalties that are so small that faces penetrate, or so large that round-off grows.
 
     The penetration, divided by the thickness, is about p / (k mu), with the traction p, the shear modulus mu and the
@@ -195,7 +195,7 @@ def _contact_penalties(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _volume_penalty(body: Body) -> Iterator[Finding]:
+def _volume_penalty(body: SizedBody) -> Iterator[Finding]:
     r"""Report a volume penalty eps with a volume change above 1 %, or with a tangent that is known to fail.
 
     At a stretch lambda the pressure is about mu lambda^2, with the shear modulus mu, and the bulk modulus is 8 mu/eps.
@@ -223,7 +223,7 @@ def _volume_penalty(body: Body) -> Iterator[Finding]:
 
 
 @register("start")
-def _units(body: Body) -> Iterator[Finding]:
+def _units(body: SizedBody) -> Iterator[Finding]:
     """Report target forces, distances of tools, and sizes of tools whose magnitudes do not fit the body."""
     natural = body.pressure_scale * body.length ** (body.scene.kinematics.dimension_of_volume - 1)
     for target in body.targets:
@@ -250,7 +250,7 @@ def _units(body: Body) -> Iterator[Finding]:
 
 
 @register("scene")
-def _targets(body: Body) -> Iterator[Finding]:
+def _targets(body: SizedBody) -> Iterator[Finding]:
     """Report targets that the body cannot reach, or whose magnitude does not fit it."""
     for target in body.targets:
         reason = unreachable(body.scene, target)

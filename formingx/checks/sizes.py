@@ -51,7 +51,7 @@ class PrescribedValue(NamedTuple):
     text: str
 
 
-class Body(Triangles):
+class SizedBody(Triangles):
     """Body before its run, with the targets of the run: the argument of the checks before a run ("scene", "start").
 
     Args:
@@ -141,7 +141,7 @@ class PressurisedFace:
     """Face of a sheet on which a pressure acts, with the fixed tools on the other side of the sheet.
 
     Args:
-        body: the `Body` with the face.
+        body: the `SizedBody` with the face.
         load: the `Pressure` on the face.
         line: nodes (R, Z) of the face in order, shape (n, 2), length.
         tools: contacts of the opposite face with fixed tools.
@@ -157,7 +157,7 @@ class PressurisedFace:
         radius: mean radius of a tube, or outer radius of another body, length.
     """
 
-    def __init__(self, body: Body, load: Any, line: np.ndarray, tools: list[Contact]):
+    def __init__(self, body: SizedBody, load: Any, line: np.ndarray, tools: list[Contact]):
         self.load, self.tools, self._body = load, tools, body
         self.length = float(np.hypot(*np.diff(line, axis=0).T).sum())
         high, wide = float(np.ptp(line[:, 1])), float(line[:, 0].max())
@@ -216,7 +216,7 @@ class PressurisedFace:
 
 
 @register("start")
-def _pressures(body: Body) -> Found:
+def _pressures(body: SizedBody) -> Found:
     """Report pressures that are too small to deform a sheet, or larger than any sheet can bear."""
     stiff = max(body.moduli.values())
     for _, _, value, name in body.pressures():
@@ -239,7 +239,7 @@ def _pressures(body: Body) -> Found:
 
 
 @register("scene")
-def _limit_pressures(body: Body) -> Found:
+def _limit_pressures(body: SizedBody) -> Found:
     """Report pressures above the pressure maximum of a sheet or tube without tools.
 
     Materials that stiffen enough have no such maximum.
@@ -257,7 +257,7 @@ def _limit_pressures(body: Body) -> Found:
 
 
 @register("scene")
-def _blow_ratio(body: Body) -> Found:
+def _blow_ratio(body: SizedBody) -> Found:
     """Report a tube that is blown into a mould that is too wide for it.
 
     Its radius grows more than 8-fold, or the estimated pressure of a uniform tube falls below 0.8 times its maximum on
@@ -285,7 +285,7 @@ def _blow_ratio(body: Body) -> Found:
 
 
 @register("scene")
-def _open_moulds(body: Body) -> Found:
+def _open_moulds(body: SizedBody) -> Found:
     """Report an open mould: parts of the sheet meet no tool along their normal, and would be blown past its end.
 
     For this a pressure of the run is larger than a free sheet bears, or the mould is deep and no target ends the run.
@@ -329,7 +329,7 @@ def _pressure_direction(face: PressurisedFace, points: np.ndarray) -> np.ndarray
 
 
 @register("start")
-def _mould_sizes(body: Body) -> Found:
+def _mould_sizes(body: SizedBody) -> Found:
     """Report a flat sheet that is more than 4 times wider or narrower than its mould."""
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
@@ -349,7 +349,7 @@ def _mould_sizes(body: Body) -> Found:
 
 
 @register("start")
-def _tool_paths(body: Body) -> Found:
+def _tool_paths(body: SizedBody) -> Found:
     """Report a moving tool that moves away from the body or never reaches it."""
     for i, tool in enumerate(body.scene.items):
         if not isinstance(tool, Contact) or tool.direction is None or not (tool.separates or tool.tool.components == 3):
@@ -421,7 +421,7 @@ def _gap(faces: list[tuple[Tool, np.ndarray]], direction: Any, travel: float) ->
 
 
 @register("scene")
-def _sharp_edges(body: Body) -> Found:
+def _sharp_edges(body: SizedBody) -> Found:
     """Report sharp convex edges of moving tools over which a body with two or more rows of elements may slide.
 
     The tool force then depends on the positions of the nodes (tests/test_check.py).
@@ -445,6 +445,6 @@ def _sharp_edges(body: Body) -> Found:
                 break
 
 
-def _names(body: Body) -> str:
+def _names(body: SizedBody) -> str:
     """Return the names of the materials of a body as text, separated by commas."""
     return ", ".join(dict.fromkeys(str(m) for m in body.scene.materials.values()))

@@ -7,11 +7,11 @@ from collections.abc import Iterator
 from ..findings import Finding, register
 from ..physics.contact import Contact
 from ..solve.stage import Plan, plan
-from .sizes import Body
+from .sizes import SizedBody
 
 
 @register("start")
-def peeling(body: Body) -> Iterator[Finding]:
+def peeling(body: SizedBody) -> Iterator[Finding]:
     """Report stages that remove the pressure from a relaxing sheet that sticks to a mould and may separate from it.
 
     The points of the relaxed sheet separate one by one, stick again beside their first places, and separate again. At
@@ -34,7 +34,7 @@ def peeling(body: Body) -> Iterator[Finding]:
                           f" the mould use Contact(..., separates=False)")
 
 
-def _pressures(step: Plan, body: Body) -> dict[int, float]:
+def _pressures(step: Plan, body: SizedBody) -> dict[int, float]:
     """Return the pressures that a stage controls, at its end, {number of the load in `Scene.items`: stress}."""
     ends = {i: float(table[-1, 1]) for i, table in step.tables}
     until = step.stage.until

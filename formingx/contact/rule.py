@@ -103,7 +103,7 @@ class Rule(Protocol):
         """
 
 
-class _Nodes:
+class _NodalPoints:
     """Base of rules whose contact points are nodes of the face, so that a point moves with the unknowns of its node.
 
     Attributes:
@@ -129,7 +129,7 @@ class _Nodes:
         return values
 
 
-class Lobatto(_Nodes):
+class Lobatto(_NodalPoints):
     """Gauss-Lobatto rule: the contact points are the nodes of the face.
 
     The integral over a straight facet is exact if the integrand, with the weight 2 pi R of the area, is cubic. A node
@@ -228,7 +228,7 @@ class Lobatto(_Nodes):
                 self.area[np.abs(away - place) < 0.1] += share * whole
 
 
-class Vertices(_Nodes):
+class Vertices(_NodalPoints):
     """Contact points of a sheet in three dimensions: its nodes, each with a third of the area of adjacent triangles.
 
     The tributary length of a node is the square root of this area.

@@ -10,7 +10,6 @@ from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from ..forms.history import Start
 from .approach import Approach, StepRejection
 
 
@@ -55,37 +54,6 @@ class EventPrediction(Protocol):
         """
 
 
-class State(Start, Protocol):
-    """Accepted state from which contact events are predicted.
-
-    Attributes:
-        direction: derivative of x by arc length (unit tangent of the path), locally owned entries, shape (n,).
-        slope: derivative of the control by arc length.
-        kind: "start" for the first state of a path; another word for its later states.
-    """
-
-    direction: np.ndarray
-    slope: float
-    kind: str
-
-
-class Curve(Protocol):
-    """Path solver that stores the LU factors of its last tangent."""
-
-    def factorise_one_sided(self, state: State) -> bool:
-        """Factorise the one-sided tangent at an accepted state, unless it was factorised last.
-
-        From the one-sided tangent the next step starts: points whose gap just closed have the stiffness of deeper
-        contact. An event predictor calls this method before it solves for the compliance of contact points.
-
-        Args:
-            state: the accepted state.
-
-        Returns:
-            True if the factors can be used; False if the tangent is singular.
-        """
-
-
 class EventPredictor(Protocol):
     """Predictor of the contact events of all contacts of a `StepLimit`."""
 
@@ -93,11 +61,11 @@ class EventPredictor(Protocol):
     def active(self) -> bool:
         """True if contact events are predicted for the contacts that are active now."""
 
-    def predict(self, curve: Curve, state: State) -> EventPrediction | None:
+    def predict(self, curve: Any, state: Any) -> EventPrediction | None:
         """Return the contact events after an accepted state.
 
         Args:
-            curve: path solver, for the tangent at the state.
+            curve: path solver (`solve.arc_length.Curve`), for the tangent at the state.
             state: the accepted state.
 
         Returns:
@@ -176,11 +144,11 @@ class StepLimit:
         """End each further step at the next gap closure, without prediction of contact events."""
         self.several_closures = False
 
-    def predict(self, curve: Curve, state: State) -> EventPrediction | None:
+    def predict(self, curve: Any, state: Any) -> EventPrediction | None:
         """Return the predicted contact events after an accepted state.
 
         Args:
-            curve: path solver, for the tangent at the state.
+            curve: path solver (`solve.arc_length.Curve`), for the tangent at the state.
             state: the accepted state.
 
         Returns:

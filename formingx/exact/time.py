@@ -41,7 +41,7 @@ _TOLERANCES = {"rtol": 1e-12, "atol": 1e-13}
 
 
 @dataclass
-class Body:
+class ThickBody:
     r"""Viscoelastic body with one degree of freedom s, and its present state; initially s = 0 and the stress is 0.
 
     For a block and a thin balloon s is the logarithm of the stretch. For a thick wall s is a^n - A^n, with the deformed
@@ -101,7 +101,7 @@ class Body:
 
         Args:
             s: new value of the degree of freedom. It is the logarithm of the stretch of a block or a balloon, or
-                a^n - A^n for the inner radius of a wall (`Body`).
+                a^n - A^n for the inner radius of a wall (`ThickBody`).
         """
         self.w = self._after_jump(s)
         self.s = s
@@ -111,7 +111,7 @@ class Body:
 
         Args:
             load: the load, stress, such as the inner pressure of a wall (`load`).
-            bracket: two values of the degree of freedom s (`Body`), between which the load is reached.
+            bracket: two values of the degree of freedom s (`ThickBody`), between which the load is reached.
         """
         from scipy.optimize import brentq
         self.jump(brentq(lambda s: self._load(s, self._after_jump(s)) - load, *bracket, xtol=1e-15, rtol=1e-14))
@@ -119,7 +119,7 @@ class Body:
     def deform(self, path: Callable, times: Any) -> np.ndarray:
         """Return the loads, stress, shape (n,), while the degree of freedom s is a prescribed function of time.
 
-        For a block s is the logarithm of its stretch and the load its stress; see `Body` for walls.
+        For a block s is the logarithm of its stretch and the load its stress; see `ThickBody` for walls.
 
         Args:
             path: function of time that returns s and ds/dt.
@@ -147,7 +147,7 @@ class Body:
 
         Returns:
             Values of s, shape (n,): the logarithm of the stretch of a block or a balloon, or a^n - A^n of a wall
-            (`Body`).
+            (`ThickBody`).
         """
         def rate(t, y):
             s, w = y[0], y[1:].reshape(self.w.shape)
@@ -166,7 +166,7 @@ class Body:
 
         Args:
             targets: values of s, shape (n,): logarithms of the stretch of a block or a balloon, or a^n - A^n of a wall
-                (`Body`).
+                (`ThickBody`).
             end: value of s at which the integration ends.
 
         Returns:
@@ -271,8 +271,8 @@ class Body:
         return found.y.T
 
 
-def block(mode: str, *, c10: float, branches: Any) -> Body:
-    r"""Return a block in a homogeneous test as a `Body`, whose load is the nominal stress P.
+def block(mode: str, *, c10: float, branches: Any) -> ThickBody:
+    r"""Return a block in a homogeneous test as a `ThickBody`, whose load is the nominal stress P.
 
     .. math:: P = T / \lambda
 
@@ -286,12 +286,13 @@ def block(mode: str, *, c10: float, branches: Any) -> Body:
     """
     check_name("block: mode", mode, MODES)
     k = MODES[mode]
-    return Body(c10, branches, np.array([1, k, -1 - k]), lambda s: (np.array([s]), np.ones(1)),
+    return ThickBody(c10, branches, np.array([1, k, -1 - k]), lambda s: (np.array([s]), np.ones(1)),
                 lambda s: (np.array([math.exp(-s)]), np.array([-math.exp(-s)])))
 
 
-def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, branches: Any, points: int = 40) -> Body:
-    r"""Return a thick tube (plane strain) or sphere as a `Body`, whose load is the inner pressure p.
+def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, branches: Any,
+         points: int = 40) -> ThickBody:
+    r"""Return a thick tube (plane strain) or sphere as a `ThickBody`, whose load is the inner pressure p.
 
     Its degree of freedom s is given by the deformed and the reference inner radius a and A. T is the difference of
     circumferential and radial Cauchy stress at the reference radius R, whose deformed radius is r:
@@ -319,13 +320,13 @@ def wall(kind: str, *, inner_radius: float, outer_radius: float, c10: float, bra
     R, rn = (A + B + (B - A) * x) / 2, n - 1
     share = (B - A) / 2 * gauss * rn * R**rn
     hoop_third_radial = np.array([1, 0, -1.0]) if kind == "tube" else np.array([1, 1, -2.0])
-    return Body(c10, branches, hoop_third_radial,
+    return ThickBody(c10, branches, hoop_third_radial,
                 lambda s: (np.log1p(s / R**n) / n, 1 / (n * (R**n + s))),
                 lambda s: (share / (R**n + s), -share / (R**n + s) ** 2))
 
 
-def balloon(*, c10: float, branches: Any) -> Body:
-    r"""Return a thin spherical balloon under the inner pressure p as a `Body`, whose load is p R0/H0.
+def balloon(*, c10: float, branches: Any) -> ThickBody:
+    r"""Return a thin spherical balloon under the inner pressure p as a `ThickBody`, whose load is p R0/H0.
 
     .. math:: \frac{p R_0}{H_0} = \frac{2 T}{\lambda^3}, \qquad \lambda = \frac{r}{R_0}
 
@@ -336,5 +337,5 @@ def balloon(*, c10: float, branches: Any) -> Body:
         c10: neo-Hookean constant of the equilibrium, stress.
         branches: (shear modulus, relaxation time) of each branch, stress and time.
     """
-    return Body(c10, branches, np.array([1, 1, -2.0]), lambda s: (np.array([s]), np.ones(1)),
+    return ThickBody(c10, branches, np.array([1, 1, -2.0]), lambda s: (np.array([s]), np.ones(1)),
                 lambda s: (np.array([2 * math.exp(-3 * s)]), np.array([-6 * math.exp(-3 * s)])))

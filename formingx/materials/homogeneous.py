@@ -131,7 +131,7 @@ def _three(stretches: Any) -> np.ndarray:
     return np.stack([l1, l2, 1 / (l1 * l2)])
 
 
-class Stability(NamedTuple):
+class MaterialStability(NamedTuple):
     r"""Ranges of stretch in which a material is stable in uniaxial tension, pure shear and equibiaxial tension.
 
     Two criteria are examined. With the stretch l, the nominal stress P and the Kirchhoff stress tau they are
@@ -171,7 +171,7 @@ class Stability(NamedTuple):
                          for (mode, a, b), what in bounds.items())
 
 
-def stability(response: Response, constants: Any, low: float, high: float) -> Stability:
+def stability(response: Response, constants: Any, low: float, high: float) -> MaterialStability:
     """Return the ranges of stretch in which a material is stable in uniaxial tension, pure shear, equibiaxial tension.
 
     A range extends from the stretch 1 to both sides, as far as a criterion holds. The criteria are a finite stress, a
@@ -217,7 +217,7 @@ def stability(response: Response, constants: Any, low: float, high: float) -> St
 
     parts = [{mode: (end(mode, criterion, low), end(mode, criterion, high)) for mode in MODES}
              for criterion in range(3)]
-    return Stability((low, high), *parts)
+    return MaterialStability((low, high), *parts)
 
 
 class _Program:

@@ -26,7 +26,7 @@ from ..figures import Axes, new_axes
 from . import homogeneous
 from .constants import OfTemperature, Sample, Varying, varying
 from .energies import Energies
-from .homogeneous import MODES, Response, Stability
+from .homogeneous import MODES, MaterialStability, Response
 
 
 class Material(Energies):
@@ -224,7 +224,7 @@ class Material(Energies):
         """
         return math.inf
 
-    def check_stability(self, stretches: Any) -> Stability:
+    def check_stability(self, stretches: Any) -> MaterialStability:
         r"""Return the ranges of stretch in which the material is stable, in each of the three tests.
 
         For each of two criteria the range around l = 1 is given in which it holds. With the nominal stress P and the

@@ -39,7 +39,7 @@ from ..errors import InputError, check_type, count, pair, positive, triple
 from ..values.temperature import FunctionOfTemperature
 from .contact_arguments import coefficient, contact_points
 from .contact_law import ContactLaw
-from .part import Part
+from .part import ScenePart
 from .penalty import RAMP_EDGE, STICKS, Law
 
 _STICKING_RATIO = 1000.0
@@ -54,7 +54,7 @@ _SLIDES, _STICK, _BONDED = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 The last pair also belongs to every tool in three dimensions; a stiffer penalty would cost iterations there."""
 
 
-class Contact(Part):
+class Contact(ScenePart):
     r"""Contact of a boundary of the body with a rigid tool, by a penalty k (Song 1993, eqs. (5.7) and (5.13)).
 
     .. math:: N = k F(d), \qquad F = (d + \theta)^2 / (4\theta) \text{ for } |d| < \theta, \quad \max(d, 0) \text{ else}

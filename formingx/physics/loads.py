@@ -9,10 +9,10 @@ import ufl
 
 from ..errors import InputError, check_type, finite, positive
 from .kinematics import cofactor_change
-from .part import Part
+from .part import ScenePart
 
 
-class Load(Part):
+class Load(ScenePart):
     """Base class of loads, also of user-defined ones; a subclass must define `virtual_work`.
 
     Args:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 
-class Part:
+class ScenePart:
     """Base class of loads, supports and contacts, the items of a model declaration (`Scene`).
 
     Attributes:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 from ..errors import InputError, check_type, finite
-from .part import Part
+from .part import ScenePart
 
 R, Z = 0, 1
 NAMES = ("r", "z", "y", "x")
@@ -51,7 +51,7 @@ class ConstrainedMean(NamedTuple):
     driven: bool = False
 
 
-class Support(Part):
+class Support(ScenePart):
     """Base class of supports, also of user-defined ones; a subclass defines `constraints`, `stored_energy`, or both.
 
     Args:

@@ -6,12 +6,13 @@ follows at the end of the last rank's entries.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import contextlib
+from collections.abc import Iterator, Sequence
 from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple, Self
 
 import numpy as np
-from dolfinx import la
+from dolfinx import fem, la
 from mpi4py import MPI
 from petsc4py import PETSc
 
@@ -21,21 +22,44 @@ from ..contact.resultants import penetration
 from ..contact.step_limit import StepLimit
 from ..errors import InputError, call_on_all_ranks
 from ..forms.admissible import WorstValue
-from ..forms.constraints import Constraints
+from ..forms.constraints import Active, Constraints
 from ..forms.formulations import formulate
-from ..forms.history import History
+from ..forms.history import ConstitutiveHistory, History, Start
 from ..forms.schedule import StepData
 from ..forms.step_error import StepError
+from ..forms.tangent import Tangent
 from ..forms.temperature import Temperature
 from ..forms.viscosity import Viscosity
 from ..ranks import combined, listed
 from ..scene.scene import Scene
+from ..scene.target_checks import implausible
 from .examine import Examination
-from .stages import Stages
-from .units import Units
 
 
-class Problem(Stages, Units):
+class _Stage(NamedTuple):
+    """Equations of one set of step data, for steps from the state at which it was set.
+
+    Attributes:
+        setting: the `StepData`.
+        active: the active constraints.
+        constrained: local numbers of the n locally owned constrained unknowns, shape (n,).
+        base: values of these unknowns at control 0, shape (n,).
+        rate: derivative of these values with respect to the control, shape (n,).
+        means: prescribed mean displacement for each `ConstrainedMean` of the scene, dimensionless.
+        unbalanced: forces f that the change of step data leaves out of balance, locally owned entries. While they fade,
+            (1 - control) f is subtracted from the residual F. None without fading.
+    """
+
+    setting: StepData
+    active: Active
+    constrained: np.ndarray
+    base: np.ndarray
+    rate: np.ndarray
+    means: list[float]
+    unbalanced: np.ndarray | None = None
+
+
+class Problem:
     """Discrete problem of a scene: its residual F, and the derivatives of F by the unknowns x and by the control.
 
     `formingx.solve.equations` describes the members that the solver calls.
@@ -56,6 +80,8 @@ class Problem(Stages, Units):
         admissible: check for inverted elements and points beyond the axis, and volume ratios (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
+
+    _predicted: tuple[Any, list[Any]] = None, []             # x, and the history variables of the forms at x
 
     def __init__(self, scene: Scene):
         _compat.collect_communicators()
@@ -86,6 +112,57 @@ class Problem(Stages, Units):
         return int(self.x.getSize())
 
     @property
+    def n_owned(self) -> int:
+        """Number of field unknowns that this rank owns."""
+        return int(self._n)
+
+    @cached_property
+    def _fields(self) -> np.ndarray:
+        """Fields of the forms on this rank, with ghosts: writable view of the unknowns of `forms.w`."""
+        return np.asarray(self.forms.w.x.array)
+
+    @cached_property
+    def _control(self) -> np.ndarray:
+        """Control of the forms, shape (): writable view of the value of `forms.control`."""
+        return np.asarray(self.forms.control.value)
+
+    @cached_property
+    def _metric(self) -> np.ndarray:
+        """Lumped mass matrix of the displacement for density 1/volume, locally owned diagonal entries, shape (n,)."""
+        return np.asarray(np.maximum(self.assemble(self.forms.compile(self.forms.metric_row())), 0))
+
+    @cached_property
+    def _tangent(self) -> Tangent:
+        """Tangent matrix of the scene, with the constraints of the current stage."""
+        made, stage = Tangent(self.forms, self._constraints, self.symmetric), self._stage
+        made.enter(stage.active, stage.setting.rate, True)
+        return made
+
+    matrix: PETSc.Mat = cached_property(lambda self: self._tangent.matrix.mat)  # type: ignore[assignment]
+
+    @property
+    def symmetric(self) -> bool:
+        return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts, *self.scene.materials.values()))
+
+    @property
+    def setting(self) -> StepData:
+        return self._stage.setting
+
+    @property
+    def control(self) -> float:
+        """Current control of the forms; inside `state_context` the control of the state."""
+        return float(self._control)
+
+    @property
+    def constrained(self) -> np.ndarray:
+        return self._stage.constrained
+
+    @property
+    def constrained_rate(self) -> np.ndarray:
+        """Derivative of the constrained unknowns with respect to the control, for the n unknowns `constrained`."""
+        return self._stage.rate
+
+    @property
     def has_kinks(self) -> bool:
         return bool(self.active_contacts)
 
@@ -102,29 +179,122 @@ class Problem(Stages, Units):
         """
         return self.forms.temperature
 
-    def examine(self, last: Any, attempt: Any) -> Examination:
-        return Examination(self, last, attempt)
-
-    def activate(self, number: int, x: np.ndarray, control: float) -> None:
-        for contact in self.contacts:
-            if contact.contact is self.scene.items[number]:
-                contact.activate(x, control)
-                depth = penetration(contact, x, control)
-                if depth > 1e-6 * self.forms.length:
-                    raise InputError(f"{contact.contact!r} takes part again where the body is, which reaches"
-                                     f" {depth:.6g} into the tool")
-
-    def followed(self, points: np.ndarray) -> np.ndarray:
-        """Return the positions on this mesh of material points that are given on the first mesh of a run.
+    def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
+        """Set the fields and the control of the forms.
 
         Args:
-            points: reference positions on the first mesh, shape (n, 2), length.
+            x: unknowns, locally owned entries, shape (n,).
+            control: load parameter (control), dimensionless.
+        """
+        self._control[()] = control
+        self.set_fields(x)
+
+    def set_fields(self, x: np.ndarray) -> None:
+        """Set the fields of the forms, and update the coefficients that depend on them.
+
+        Args:
+            x: unknowns, locally owned entries, shape (n,).
+        """
+        self._fields[: self._n] = x[: self._n]
+        if self.comm.size > 1:
+            self.forms.w.x.scatter_forward()
+        self.forms.refresh()
+
+    def motion(self, control: float) -> np.ndarray:
+        """Return a vector of unknowns with the prescribed values of the constrained ones, and 0 elsewhere.
+
+        Args:
+            control: dimensionless control, on which prescribed displacements depend.
 
         Returns:
-            Reference positions on this mesh, shape (n, 2), length.
+            Locally owned entries, shape (n,).
         """
-        state_transfer = self.scene.state_transfer
-        return points if state_transfer is None else state_transfer.followed(self, points)
+        values = np.zeros(self.x.getLocalSize())
+        values[self.constrained] = self._stage.base + self._stage.rate * control
+        return values
+
+    def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
+        """Set the fields and the control of the forms from a vector of unknowns.
+
+        Args:
+            x: unknowns.
+            control: load parameter (control), dimensionless.
+
+        Returns:
+            Lagrange multipliers of the constrained mean displacements of boundaries (`ConstrainedMean`), shape
+            (means,), the same on all ranks.
+        """
+        values, last = x.array_r, self.comm.size - 1
+        self.set_fields_and_control(values, control)
+        if not last:
+            return values[self._n:].copy()
+        multipliers = np.zeros(len(self._stage.active.rows))
+        if self.comm.rank == last:
+            multipliers[:] = values[self._n:]
+        if len(multipliers):
+            self.comm.Bcast(multipliers, root=last)
+        return multipliers
+
+    def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
+        r"""Return the inner product of two dimensionless displacement fields, by a lumped mass matrix.
+
+        .. math:: \frac{1}{V} \int_V a \cdot b \, dV
+
+        V is the reference volume. Pressures and multipliers do not count.
+
+        Args:
+            a: first vector of unknowns, whose displacements are divided by the length scale L.
+            b: second vector of unknowns.
+
+        Returns:
+            Inner product (dimensionless).
+        """
+        return self._dot(self._metric * a.array_r[: self._n], b.array_r[: self._n])
+
+    def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
+        self.fill(out, self._metric * a.array_r[: self._n])
+
+    def stiff_state(self, out: PETSc.Vec) -> None:
+        self.forms.set_stiff()
+        self.fill(out, self.forms.w.x.array[: self._n])
+
+    def assemble(self, form: Any) -> np.ndarray:
+        """Assemble a compiled linear form at the current fields and control of the forms.
+
+        Args:
+            form: compiled linear form.
+
+        Returns:
+            Locally owned entries, shape (n,).
+        """
+        return _compat.assemble_vector(self._buffer, form).copy()
+
+    def assemble_scalar(self, form: Any) -> float:
+        """Assemble a compiled scalar form at the current fields and control of the forms, over all ranks.
+
+        Args:
+            form: compiled form without arguments.
+
+        Returns:
+            Value of the form.
+        """
+        return float(combined(self.comm, fem.assemble_scalar(form), MPI.SUM))
+
+    def fill(self, out: PETSc.Vec, values: np.ndarray, tail: list[float] | None = None) -> None:
+        """Set a vector from locally owned field values and multipliers.
+
+        Args:
+            out: vector that receives the values.
+            values: values of the fields, shape (n,).
+            tail: values of the multipliers, used on the last rank; None: 0.
+        """
+        array = out.array_w
+        array[: self._n] = values
+        array[self._n:] = 0.0 if tail is None or self.comm.rank < self.comm.size - 1 else tail
+
+    def _dot(self, a: np.ndarray, b: np.ndarray) -> float:
+        """Return the dot product of two vectors of locally owned entries over all ranks."""
+        return float(combined(self.comm, float(np.dot(a, b)), MPI.SUM))
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
         stage, multipliers, fields = self._stage, self.set_state(x, control), x.array_r[: self._n]
@@ -301,6 +471,191 @@ class Problem(Stages, Units):
         if self._stage.unbalanced is not None:
             out.array_w += self._stage.unbalanced
 
+    @property
+    def has_history(self) -> bool:
+        return bool(self.histories)
+
+    @property
+    def materials(self) -> list[ConstitutiveHistory]:
+        """History of each material with internal variables or past states (`ConstitutiveHistory`)."""
+        return [history for history in self.forms.histories if isinstance(history, ConstitutiveHistory)]
+
+    @property
+    def body_has_history(self) -> bool:
+        """True if materials or the temperature have history variables."""
+        return bool(self.forms.histories)
+
+    @property
+    def relaxes(self) -> bool:
+        """True if the body is rate-dependent, through a material or through its temperature."""
+        return any(not isinstance(history, ConstitutiveHistory) or history.rate_dependent
+                   for history in self.forms.histories)
+
+    @property
+    def time(self) -> float:
+        """Process time at the current load parameter (control)."""
+        return self.forms.time_at(self.control)
+
+    @property
+    def clock(self) -> float:
+        """Process time at control 0; a run that chooses its own time steps sets it before each step."""
+        return self.forms.clock
+
+    @clock.setter
+    def clock(self, time: float) -> None:
+        self.forms.clock = time
+
+    def time_at(self, control: float) -> float:
+        return self.forms.time_at(control)
+
+    @property
+    def history_variables(self) -> list[Any]:
+        """History variables of the last accepted state: the result of `History.get` for each of `histories`."""
+        return [history.get() for history in self.histories]
+
+    @history_variables.setter
+    def history_variables(self, variables: list[Any]) -> None:
+        self._predicted = None, []
+        for history, stored in zip(self.histories, variables, strict=True):
+            history.put(stored)
+
+    def advance(self, x: np.ndarray, control: float) -> None:
+        if self.forms.histories:
+            self.set_fields_and_control(x, control)
+        known = self._predicted[1] if self._predicted[0] is x else []
+        for history in self.histories[: len(self.histories) - len(known)]:
+            history.advance(x[: self.n_owned], control)
+        for history, variables in zip(self.forms.histories, known):
+            history.put(variables)
+        self._predicted = None, []
+
+    def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
+        """Update the history variables of materials and temperature to the end of a step that is not yet accepted.
+
+        The result is stored, and `advance` uses it if it accepts the same x. The caller must restore the earlier
+        history variables.
+
+        Args:
+            start: state at the beginning of the step.
+            x: unknowns at the end of the step, locally owned entries, shape (n,).
+            control: load parameter (control) at the end of the step, dimensionless.
+
+        Returns:
+            History variables of materials and temperature at the end of the step.
+        """
+        self.set_fields_and_control(x, control)
+        for history in self.forms.histories:
+            history.advance(x[: self.n_owned], control, start)
+        after = [history.get() for history in self.forms.histories]
+        self._predicted = x, after
+        return after
+
+    @contextlib.contextmanager
+    def state_context(self, state: Any) -> Iterator[Self]:
+        """Set the problem to a state inside the context, and restore the previous values at its end.
+
+        Step data, history variables, unknowns (`x`, `forms.w`) and control are set.
+
+        Args:
+            state: object with x (locally owned entries), control, time, setting (`StepData` as plain data, or empty)
+                and history_variables.
+
+        Yields:
+            The problem.
+        """
+        fields, control, clock = self._fields.copy(), self.control, self.forms.clock
+        stage, variables, x, predicted = self._stage, self.history_variables, self.x.array_r.copy(), self._predicted
+        try:
+            self.restore(state)
+            self.x.array_w[:] = state.x
+            self.set_state(self.x, state.control)
+            yield self
+        finally:
+            self.history_variables, self._predicted = variables, predicted
+            self._set_stage(stage)
+            self.forms.clock = clock
+            self.x.array_w[:] = x
+            self._fields[:], self._control[()] = fields, control
+
+    def restore(self, state: Any) -> None:
+        """Restore step data, history variables and process time of an accepted state, to start a step from it.
+
+        Args:
+            state: object with x (locally owned entries), control, time, setting (`StepData` as plain data, or empty)
+                and history_variables.
+        """
+        if self.has_history:
+            self.history_variables = state.history_variables
+        if state.setting:
+            self.enter(StepData(**state.setting), state.x, state.control)
+        if not self.setting.rate[-1]:
+            self.forms.clock = state.time
+
+    @property
+    def fading_forces(self) -> np.ndarray | None:
+        """Forces f that a change of loads, supports or contacts left out of balance, for the locally owned fields.
+
+        They fade as the control goes from 0 to 1: at a control, (1 - control) f is subtracted from the residual. Shape
+        (n,), dimensionless; None if the step data have no fading.
+        """
+        return None if self._stage.unbalanced is None else self._stage.unbalanced[: self._n]
+
+    def enter(self, setting: StepData, x: np.ndarray, control: float) -> None:
+        before = self._stage
+        if before is not None and setting == before.setting:
+            return
+        same = before is not None and before.setting.inactive == setting.inactive
+        active = before.active if same else self._constraints.active(set(setting.inactive))
+        rate, constrained = np.append(setting.rate, 0.0)[active.driver][active.owned], active.dofs[active.owned]
+        stage = _Stage(setting, active, constrained, x[constrained] - rate * control, rate,
+                       [self._dot(row, x[: self._n]) for row in active.rows])
+        self._set_stage(stage)
+        if setting.fading and control < 1:
+            unknowns, unbalanced = self.x.duplicate(), self.x.duplicate()
+            unknowns.array_w[:] = x
+            self.residual(unknowns, control, unbalanced)
+            self._stage = stage._replace(unbalanced=unbalanced.array_r / (1 - control))
+            unknowns.destroy()
+            unbalanced.destroy()
+
+    def _set_stage(self, stage: _Stage) -> None:
+        """Set the loads of the forms, the active contacts and the constraints of the matrix from `stage`."""
+        before, self._stage = self._stage, stage
+        if before is stage:
+            return
+        setting, number = stage.setting, {id(item): i for i, item in enumerate(self.scene.items)}
+        self.forms.set_loads(setting)
+        for contact in self.contacts:
+            i = number[id(contact.contact)]
+            contact.enter(setting.base[i], setting.rate[i], i not in setting.inactive)
+        self.active_contacts = [contact for contact in self.contacts if contact.active]
+        if "_tangent" in vars(self):
+            self._tangent.enter(stage.active, setting.rate, before is None or before.active is not stage.active)
+
+    def examine(self, last: Any, attempt: Any) -> Examination:
+        return Examination(self, last, attempt)
+
+    def activate(self, number: int, x: np.ndarray, control: float) -> None:
+        for contact in self.contacts:
+            if contact.contact is self.scene.items[number]:
+                contact.activate(x, control)
+                depth = penetration(contact, x, control)
+                if depth > 1e-6 * self.forms.length:
+                    raise InputError(f"{contact.contact!r} takes part again where the body is, which reaches"
+                                     f" {depth:.6g} into the tool")
+
+    def followed(self, points: np.ndarray) -> np.ndarray:
+        """Return the positions on this mesh of material points that are given on the first mesh of a run.
+
+        Args:
+            points: reference positions on the first mesh, shape (n, 2), length.
+
+        Returns:
+            Reference positions on this mesh, shape (n, 2), length.
+        """
+        state_transfer = self.scene.state_transfer
+        return points if state_transfer is None else state_transfer.followed(self, points)
+
     def update_temperature(self) -> None:
         """Update material constants and coefficients of friction to a changed temperature; collective.
 
@@ -309,6 +664,50 @@ class Problem(Stages, Units):
         """
         call_on_all_ranks(self.comm, [self.forms.update_temperature,
                                       *(contact.update_temperature for contact in self.contacts)])
+
+    @property
+    def why_not_finite(self) -> str:
+        limits = {f"{m} was stretched beyond its limit, I1 < {m.largest_I1:.6g}": None
+                  for m in self.scene.materials.values() if m.largest_I1 < np.inf}
+        strained = limits or ["a material was strained beyond what its law allows"]
+        return ", or ".join(["an element turned inside out", *strained])
+
+    def shown(self, control: float) -> tuple[str, float]:
+        number, items = self.setting.controlled, self.scene.items
+        if number is None:
+            return "control", control
+        name = "process time" if number == len(items) else self.scene.column(items[number]).replace("_", " ")
+        return name, self.forms.scales[number] * self.setting.amplitude(number, control)
+
+    def implausible(self, control: float) -> str | None:
+        return implausible(self.scene, self.control_kind, self.shown(control)[1])
+
+    @property
+    def control_kind(self) -> str | None:
+        number, items = self.setting.controlled, self.scene.items
+        return None if number is None else "time" if number == len(items) else items[number].quantity
+
+    @property
+    def fixed_loads(self) -> list[str]:
+        return [repr(load) for load in self.scene.loads if not load.driven]
+
+    @property
+    def main_columns(self) -> list[str]:
+        return ["process_time", *map(self.scene.column, self.scene.drivable), "pole_height", "pole_stretch"]
+
+    @property
+    def scales(self) -> Sequence[float]:
+        return self.forms.scales
+
+    @property
+    def units(self) -> tuple[float, float]:
+        """Units of the dimensionless energy of the whole part (stress length^3) and of length, in the user's units."""
+        return self.scene.symmetry_factor * self.forms.stress * self.forms.volume, self.forms.length
+
+    @property
+    def singular_unloaded(self) -> bool:
+        """True if the body in the reference configuration has no stiffness in some direction."""
+        return self.forms.singular_unloaded
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

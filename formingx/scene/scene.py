@@ -22,7 +22,7 @@ from ..physics.contact_arguments import MAX_DEGREE
 from ..physics.kinematics import Axisymmetric, Kinematics, ThreeD
 from ..physics.loads import Load
 from ..physics.models import Membrane, MixedPressure, Model
-from ..physics.part import Part
+from ..physics.part import ScenePart
 from ..physics.supports import Support
 from . import boundary_checks, contact_checks, support_checks
 from .sampling import sample
@@ -198,7 +198,7 @@ class Scene:
                      temperature=temperature)
 
     @property
-    def items(self) -> list[Part]:
+    def items(self) -> list[ScenePart]:
         """Loads, then supports, then contacts of the scene. The number of an item is its index in this list, from 0."""
         return [*self.loads, *self.supports, *self.contacts]
 

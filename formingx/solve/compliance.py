@@ -56,7 +56,7 @@ class BorderedTangent:
         return steps
 
 
-class Columns:
+class BorderedColumns:
     """Solutions of the bordered system for m right-hand sides, such as unit forces at contact points.
 
     The bordered system is K dx = E for the tangent K, with the constraint of the step as a further row.
@@ -170,7 +170,7 @@ class CondensedColumns:
         return np.array([self.update(column)[0] for column in factors.T]).T
 
 
-def columns(solver: DirectSolver, E: Array, border: Border) -> Columns | CondensedColumns:
+def columns(solver: DirectSolver, E: Array, border: Border) -> BorderedColumns | CondensedColumns:
     """Solve the bordered system for m right-hand sides, by entries of K^-1 if this costs less than m full solutions.
 
     The bordered system is K dx = E for the tangent K, with the constraint of the step as a further row.
@@ -190,4 +190,4 @@ def columns(solver: DirectSolver, E: Array, border: Border) -> Columns | Condens
         inverse = solver.inverse(rows)
         if inverse is not None:
             return CondensedColumns(solver, E, border, inverse, rows)
-    return Columns(solver, E, border)
+    return BorderedColumns(solver, E, border)

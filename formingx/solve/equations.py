@@ -34,30 +34,13 @@ from ..contact.face import FaceContact
 from ..contact.step_limit import StepLimit
 from ..forms.history import ConstitutiveHistory
 from ..forms.schedule import StepData
+from ..forms.viscosity import Viscosity as Viscosity
+from ..measures.quantities import Quantity as Quantity
 
 Array: TypeAlias = npt.NDArray[Any]
 
 Constraint = Callable[[PETSc.Vec, float, PETSc.Vec], tuple[float, float]]
 """Function (x, control, gradient) -> (c, dc/dcontrol) of a constraint c = 0; it sets the vector `gradient` to dc/dx."""
-
-
-class Quantity(Protocol):
-    """Output quantity: a number that every state has, such as a pole height.
-
-    Attributes:
-        size: size of the quantity, in the user's units; differences below 1e-12 `size` are round-off.
-    """
-
-    size: float
-
-    def value(self, x: PETSc.Vec, control: float) -> float:
-        """Return the value of the quantity in the user's units.
-
-        x: unknowns of the state. control: load parameter (control) of the state, dimensionless.
-        """
-
-    def equation(self, target: float) -> Constraint:
-        """Return the constraint "quantity = target"; `target` is in the user's units."""
 
 
 class ProblemState(Protocol):
@@ -77,25 +60,6 @@ class ProblemState(Protocol):
     time: float
     history_variables: list[Any]
     setting: dict[str, Any]
-
-
-class Viscosity(Protocol):
-    """Viscous forces eta V dx of a body in a change dx of the unknowns.
-
-    V is the matrix of a viscous stress with viscosity 1, and eta the viscosity over the shear modulus.
-    """
-
-    def forces(self, change: Array, eta: float) -> Array:
-        """Return the viscous forces eta V dx, locally owned entries, shape (n,).
-
-        change: change dx of the unknowns, locally owned entries, shape (n,). eta: viscosity over the shear modulus.
-        """
-
-    def add_to(self, tangent: PETSc.Mat, eta: float) -> None:
-        """Add eta V to a tangent matrix in place; eta: viscosity over the shear modulus."""
-
-    def destroy(self) -> None:
-        """Free the PETSc objects (collective)."""
 
 
 class Attempt(NamedTuple):
@@ -336,7 +300,7 @@ class Stages(Protocol):
         """
 
 
-class Units(Protocol):
+class ProblemUnits(Protocol):
     """Units and names of the dimensionless numbers of a problem, in messages and results."""
 
     @property
@@ -384,5 +348,5 @@ class Units(Protocol):
         return None
 
 
-class Equations(Residual, ActiveSet, Histories, Stages, Units, Protocol):
+class Equations(Residual, ActiveSet, Histories, Stages, ProblemUnits, Protocol):
     """Interface of a problem F(x, control) = 0 for the solver."""

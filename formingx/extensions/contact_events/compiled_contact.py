@@ -346,8 +346,8 @@ void frame(long m, const double *positions, const long *rows, const double *forc
 def compiled() -> Any:
     """Return an object with the compiled C functions; arrays are passed to them by address.
 
-    For m contact points of a `Points` object, `forces_at_end` computes contact forces after a motion, `rates` their
-    derivatives with respect to arc length, `change` the first change of a contact status, and `frame` the tool geometry
-    (`ToolFrame`).
+    For m contact points of a `CondensedPoints` object, `forces_at_end` computes contact forces after a motion, `rates`
+    their derivatives with respect to arc length, `change` the first change of a contact status, and `frame` the tool
+    geometry (`ToolFrame`).
     """
     return functions("reduced_contact", _HEADER, _SOURCE)

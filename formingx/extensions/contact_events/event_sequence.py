@@ -26,8 +26,8 @@ from ...ranks import combined, listed
 from ...values.tolerances import FAR, LARGE_ERROR
 from .gap_closure import GapClosure
 from .path_segment import PathSegment
-from .reduced_contact import Points, ToolFrame
-from .response import Response
+from .reduced_contact import CondensedPoints, ToolFrame
+from .response import BodyResponse
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ class ContactEventSequence:
         n: number of locally owned unknowns of the fields, the first entries of x.
         x, control: unknowns (locally owned entries) and control of the accepted state.
         direction, slope: derivatives of x and of the control with respect to arc length.
-        response: `Response`, which solves for the motion of the body under contact forces by the stored LU factors.
+        response: `BodyResponse`, which solves for the motion of the body under contact forces by the stored LU factors.
         batch: number of points of a face whose compliance is computed at a time.
 
     Attributes:
@@ -92,10 +92,10 @@ class ContactEventSequence:
     """
 
     def __init__(self, faces: Sequence[Any], n: int, x: np.ndarray, control: float, direction: np.ndarray, slope: float,
-                 response: Response, batch: int):
+                 response: BodyResponse, batch: int):
         self._faces, self._response, self._comm, self._batch = faces, response, faces[0].comm, batch
         self._n, self._tangent = n, (x, control, direction, slope)
-        self._points = Points(faces, n, len(x), response)
+        self._points = CondensedPoints(faces, n, len(x), response)
         start = [face.positions(x[:n], control) for face in faces]
         self._along = np.concatenate([face.relative_motion(direction[:n], slope) for face in faces])
         self._area = np.concatenate([face.rule.area for face in faces]) > 0

@@ -16,7 +16,7 @@ from ...contact.approach import LIMITS, Approach
 from ...contact.step_limit import StepLimit
 from ...ranks import combined
 from .event_sequence import ContactEventSequence
-from .response import Response
+from .response import BodyResponse
 
 log = logging.getLogger("formingx")
 
@@ -82,7 +82,7 @@ class ContactEventPredictor:
             return None
         self._vectors = self._vectors or [curve.problem.x.duplicate(), curve.problem.x.duplicate()]
         return ContactEventPrediction(contacts, [self.allowed(c) for c in contacts], n, state,
-                                      Response(curve, state, *self._vectors))
+                                      BodyResponse(curve, state, *self._vectors))
 
 
 class ContactEventPrediction:
@@ -96,7 +96,7 @@ class ContactEventPrediction:
         response: linearised response of the body to contact forces at this state.
     """
 
-    def __init__(self, contacts: list[Approach], allowed: list[int], n: int, state: Any, response: Response):
+    def __init__(self, contacts: list[Approach], allowed: list[int], n: int, state: Any, response: BodyResponse):
         self._contacts, self._allowed, self._known = contacts, allowed, True
         self._sequence = ContactEventSequence([c.face for c in contacts], n, state.x, state.control, state.direction,
                                               state.slope, response, max(allowed))

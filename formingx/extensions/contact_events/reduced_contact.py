@@ -32,7 +32,7 @@ from ...ranks import combined, listed
 from ...values.tolerances import FAR
 from .compiled_contact import compiled
 from .gap_closure import GapClosure
-from .response import Response
+from .response import BodyResponse
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class ToolFrame(NamedTuple):
     beyond: np.ndarray
 
 
-class Points:
+class CondensedPoints:
     """Contact points of all ranks whose compliance is known: the motion of the body under unit forces at these points.
 
     Each unit force contributes -1 to one component (r or z) of the residual F at one point. m is the number of these
@@ -88,7 +88,7 @@ class Points:
         faces: the active `FaceContact` objects.
         n: number of locally owned unknowns of the fields, the first entries of x.
         size: number of locally owned entries of x.
-        response: `Response`, which solves for the motion of the body under forces by the stored LU factors.
+        response: `BodyResponse`, which solves for the motion of the body under forces by the stored LU factors.
 
     Attributes:
         point_ids: (rank, face, point) of each of the m points.
@@ -100,7 +100,7 @@ class Points:
         elastic_slip: elastic slip at which a point begins to slide, shape (m,), length.
     """
 
-    def __init__(self, faces: Sequence[Any], n: int, size: int, response: Response):
+    def __init__(self, faces: Sequence[Any], n: int, size: int, response: BodyResponse):
         self._faces, self._n, self._response, self._comm = faces, n, response, faces[0].comm
         empty: Any = np.zeros(0)
         self.point_ids: list[tuple[int, int, int]] = []

@@ -12,7 +12,7 @@ from ...solve.local_contact import unit_forces
 from ...solve.state import State
 
 
-class Response:
+class BodyResponse:
     r"""Response of the unknowns x and the control to contact forces, linearised at an accepted state.
 
     The linearised equations are K dx = E, with right-hand sides E such as unit forces. The response to E is

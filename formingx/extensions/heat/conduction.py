@@ -31,7 +31,7 @@ from ...solve.linear import DirectSolver
 from ...values.table import Table
 from .boundaries import Absorption, FixedTemperature, ThermalProperties
 from .contact import ContactWithTool, HeatContact
-from .implicit_stage import Stage
+from .implicit_stage import ImplicitStage
 from .vectors import HeatVectors
 
 _MAX_ITERATIONS = 20
@@ -140,7 +140,7 @@ class Conduction(HeatVectors):
         Returns:
             Rates of heat M dT/dt with the capacity matrix M, a list of arrays with the shapes of `state`. For the body
             they are divided by its heat capacity, degrees per time; for the tools they are per contact area. Then the
-            heat per time into the whole body through each boundary and from each source, as `Stage.heats`.
+            heat per time into the whole body through each boundary and from each source, as `ImplicitStage.heats`.
         """
         R = self._body_rate(state[0])
         found, through = [R], []
@@ -151,7 +151,7 @@ class Conduction(HeatVectors):
             found.append(rate)
         return found, self._heats(through)
 
-    def stage(self, state: list[np.ndarray], known: list[np.ndarray], c: float, guess: np.ndarray) -> Stage:
+    def stage(self, state: list[np.ndarray], known: list[np.ndarray], c: float, guess: np.ndarray) -> ImplicitStage:
         r"""Solve an implicit stage of a time step for body and tools with Newton's method.
 
         .. math:: M \Delta = k + c R(y + \Delta)
@@ -251,7 +251,7 @@ class Conduction(HeatVectors):
             item.destroy()
 
     def _end_of_stage(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
-                responses: list[Any]) -> Stage:
+                responses: list[Any]) -> ImplicitStage:
         """Return changes, rates and heats of an implicit stage that has converged.
 
         Args:
@@ -270,7 +270,7 @@ class Conduction(HeatVectors):
             through.append(touch.area @ q)
             changes.append(moved)
             rates.append(rate)
-        return Stage(changes, rates, self._heats(through))
+        return ImplicitStage(changes, rates, self._heats(through))
 
     def _heats(self, tool_heats: list[float]) -> np.ndarray:
         """Return the heat per time into the whole body at the temperature `T`, summed over ranks, shape (k,).

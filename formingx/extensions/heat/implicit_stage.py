@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 
-class Stage(NamedTuple):
+class ImplicitStage(NamedTuple):
     """Result of an implicit stage of a time step, for a body and the tools in contact with it.
 
     Attributes:

@@ -13,7 +13,7 @@ EDGE_ANGLE = 40.0
 """Angle between tool normals at neighbouring contact points above which a run warns, degrees (tests/test_edges.py)."""
 
 
-class Edge(NamedTuple):
+class SharpEdge(NamedTuple):
     """Convex edge or fillet of a tool between two neighbouring contact points, at least one of which slides.
 
     Attributes:
@@ -27,7 +27,7 @@ class Edge(NamedTuple):
     point: tuple[float, float]
 
 
-def coarsest(path: Any, state: Any) -> Edge | None:
+def coarsest(path: Any, state: Any) -> SharpEdge | None:
     """Return the tool edge at which the tool normal turns most between two neighbouring contact points; collective.
 
     Contacts that stick or never separate are not examined. Neighbours are contact points that follow each other when
@@ -41,7 +41,7 @@ def coarsest(path: Any, state: Any) -> Edge | None:
     Returns:
         The edge, or None if the body slides over no convex edge.
     """
-    found: list[Edge] = []
+    found: list[SharpEdge] = []
     with path.problem.state_context(state) as problem:
         fields = problem.x.array_r.copy()
         free = np.ones(len(fields))
@@ -64,11 +64,11 @@ def coarsest(path: Any, state: Any) -> Edge | None:
             turn *= adjacent & sliding & convex
             for k in np.argsort(turn)[-1:]:
                 r, z = x[k] + steps[k] / 2 + contact.tool_displacement(state.control)
-                found.append(Edge(float(turn[k]), contact.contact.label, (float(r), float(z))))
+                found.append(SharpEdge(float(turn[k]), contact.contact.label, (float(r), float(z))))
     return max((edge for edge in found if edge.turn > 0), default=None)
 
 
-def findings(edge: Edge | None) -> list[Finding]:
+def findings(edge: SharpEdge | None) -> list[Finding]:
     """Return a warning in a list if the elements are too large for the tool edge over which the body slides.
 
     Args:

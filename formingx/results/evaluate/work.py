@@ -36,7 +36,7 @@ _MAX_HALVINGS = 6              # largest number of halvings of a step
 _SPLIT_OFFSET = 0.15       # distance from the middle of a step at which it is split if no state is found there
 
 
-class _Reaction(NamedTuple):
+class _SupportReaction(NamedTuple):
     """Reaction of a driven support or a tool in a state, on the modelled body: the whole, a half or a quarter.
 
     Attributes:
@@ -69,7 +69,7 @@ class EnergyBalance:
         self._driven = [(i, item) for i, item in enumerate(scene.items)
                         if any(item is d for d in scene.drivable) and item not in scene.loads]
         self._stored = forms.compile(forms.energy) if scene.heat is not None or forms.elastic_supports else None
-        self._ends: dict[int, tuple[Any, dict[str, _Reaction]]] = {}
+        self._ends: dict[int, tuple[Any, dict[str, _SupportReaction]]] = {}
 
     def rows(self) -> dict[str, np.ndarray]:
         """Return the energies that are added between successive states; collective.
@@ -206,13 +206,13 @@ class EnergyBalance:
                     found["change"] = found.get("change", 0.0) + w * self._sum(unbalanced * rate)
         return found
 
-    def _reactions(self, state: Any) -> dict[str, _Reaction]:
+    def _reactions(self, state: Any) -> dict[str, _SupportReaction]:
         """Return {name of a driven support or tool: its reaction in a state}, computed once for each state."""
         if id(state) not in self._ends:
             self._ends[id(state)] = state, self._compute_reactions(state) if self._driven else {}
         return self._ends[id(state)][1]
 
-    def _compute_reactions(self, state: Any) -> dict[str, _Reaction]:
+    def _compute_reactions(self, state: Any) -> dict[str, _SupportReaction]:
         """Return {name of a driven support or tool: its reaction in a state}, computed anew; collective."""
         problem, found = self._problem, {}
         scene, forms = problem.scene, problem.forms
@@ -241,7 +241,7 @@ class EnergyBalance:
                 else:
                     force = -p.reaction(i, p.x, state.control)
                     slope = self._sum(change[p.driven_unknowns(i)])
-                found[_entry_name(scene, item)] = _Reaction(force, slope, travel, travel_slope)
+                found[_entry_name(scene, item)] = _SupportReaction(force, slope, travel, travel_slope)
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
