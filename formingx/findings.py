@@ -50,7 +50,7 @@ def percent(share: float) -> str:
 class Check(Protocol[Subject]):
     """Interface of a check: a function of its subject.
 
-    The subject is the body before a run (`formingx.checks.sizes.Body`), the `Path` after a run, or a failed run
+    The subject is the body before a run (`formingx.checks.sizes.SizedBody`), the `Path` after a run, or a failed run
     (`formingx.solve.diagnose.FailedRun`).
     """
 

@@ -1,4 +1,4 @@
-"""The structure of the package: the order of folders in imports, without circles; classes and files of a size to read."""
+"""The structure of the package: the order of folders in imports, without circles; length of files, names of classes."""
 
 import ast
 import functools

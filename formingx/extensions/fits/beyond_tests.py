@@ -27,7 +27,7 @@ def expected_stretches_beyond_tests(body: Any) -> Iterator[Finding]:
     square root of the areal draw ratio.
 
     Args:
-        body: the examined `formingx.checks.sizes.Body`, before its run.
+        body: the examined `formingx.checks.sizes.SizedBody`, before its run.
 
     Yields:
         A warning for each layer with such constants, and for each expected stretch beyond its tests.

@@ -81,7 +81,7 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
     """Find chilled faces of a sheet with too few layers of elements below them; collective.
 
     Args:
-        body: the examined body (`formingx.checks.sizes.Body`), with its `scene` and the `thickness` of the sheet.
+        body: the examined body (`formingx.checks.sizes.SizedBody`), with its `scene` and the `thickness` of the sheet.
 
     Yields:
         A warning for the face with the largest error.

@@ -16,7 +16,7 @@ def ruptures(body: Any) -> Iterator[Finding]:
     """Find processes that stretch a sheet beyond the equibiaxial `rupture_stretch` of its material.
 
     Args:
-        body: the examined `formingx.checks.sizes.Body`.
+        body: the examined `formingx.checks.sizes.SizedBody`.
 
     Yields:
         A warning for each layer and each load, target or tool that causes such a stretch.
