@@ -99,7 +99,7 @@ MUTANTS = [Mutant(*row) for row in [
     # solution path
     ("solve/path_following.py", "if (limit.control - old.control) * old.slope < 0:", "if False:", "treloar"),
     ("solve/path_following.py", "if was_passed(self.curve", "if False and was_passed(self.curve", "details"),
-    ("solve/path_following.py", "if error > self.settings.max_time_error:", "if False:", "time accuracy viscoelastic"),
+    ("solve/path_following.py", "if error > self.settings.max_time_error:", "if False:", "steps_in_time time accuracy"),
     ("solve/path_following.py", "if not 0 < self.curve.progress(old, new) < 2 * length:", "if False:",
      "details"),
     ("solve/progress.py", "change *= now / (now - then) if now * then < 0 else 1.0", "change *= 1.0", "details"),
