@@ -55,12 +55,12 @@ def coarse_fillets_of_files(body: Any) -> Iterator[Finding]:
     Yields:
         A finding for each tool with such a fillet.
     """
-    from scipy.spatial import cKDTree
-
-    from .passed_tools import surface_points
     scene = body.scene
     if scene.kinematics.components != 3 or not scene.mesh.flat:
         return
+    from scipy.spatial import cKDTree
+
+    from .passed_tools import surface_points
     nodes, length = gathered(scene.mesh.comm, scene.mesh.domain.geometry.x), _median_edge(scene.mesh)
     for contact in scene.contacts:
         if not files_of(contact.tool):
