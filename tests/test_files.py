@@ -501,12 +501,13 @@ def test_a_part_that_recovers_has_its_height_over_time():
 
 def test_labels_of_all_stages_have_room_in_an_animation(formed, monkeypatch):
     """The force of the second stage has longer numbers than the pressure of the first."""
-    figures, plain = [], animation.figures.figure
-    monkeypatch.setattr(animation.figures, "figure", lambda *size, **more: figures.append(plain(*size, **more)) or figures[-1])
+    drawn, plain = [], animation.figures.figure
+    monkeypatch.setattr(animation.figures, "figure",
+                        lambda *size, **more: drawn.append(plain(*size, **more)) or drawn[-1])
     curves = {("pole_height", "pressure"): ([0, 1], [0, 1]), ("process_time", "mould_force"): ([0, 1], [0, 12345.6])}
     shape = formed.profile()
     animation._draw([shape] * 2, [[]] * 2, [(names, (0, 0)) for names in curves], curves, True, fx.Units())
-    (figure, (_, loading)), = figures
+    (figure, (_, loading)), = drawn
     bar = figure.axes[-1]
     assert loading.get_ylabel() == "mould force"
     assert loading.yaxis.label.get_window_extent().x0 > bar.yaxis.label.get_window_extent().x1
