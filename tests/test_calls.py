@@ -24,7 +24,7 @@ def path():
      r"disc: thicknes= is not known: did you mean thickness=\?: must be disc"),
     (lambda p: fx.StepControl(lenght=0.1),
      r"StepControl: lenght= .* mean length=\?: must be StepControl\(length=0.1, target=4"),
-    (lambda p: fx.Pressure("bottom", 1.0, None, 3), r"must be Pressure\(on, value=None, name=None\)"),
+    (lambda p: fx.Pressure("bottom", 1.0, None, None, 3), r"must be Pressure\(on, value=None, name=None, above=None\)"),
     (lambda p: fx.SimplySupported(of="rim"), r"must be SimplySupported\(on, weight="),
     (lambda p: fx.trace(p.problem.scene, fx.pole_height(0.1), 3), "trace: too many positional"),
     (lambda p: fx.tools.cup(1, 2), "cup: too many positional"),

@@ -72,7 +72,7 @@ def test_condensed_solutions_are_the_full_ones(solver, monkeypatch):
     full = compliance.columns(made, E, border)
     monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(min_columns=7, min_rows=N))
     condensed = compliance.columns(made, E, border)
-    assert isinstance(full, compliance.Columns) and isinstance(condensed, compliance.CondensedColumns)
+    assert isinstance(full, compliance.BorderedColumns) and isinstance(condensed, compliance.CondensedColumns)
     forces = random.normal(size=(7, 2))
     assert condensed.steps == pytest.approx(full.steps, rel=1e-10)
     assert condensed.motions(moved) == pytest.approx(full.motions(moved), rel=1e-9, abs=1e-12)

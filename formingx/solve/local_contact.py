@@ -241,8 +241,11 @@ class _Points:
         for k in range(_LOCAL.max_iterations):
             f, S = self._law(laws, y)
             added = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
-            R = y - y0 + self._C @ added
+            with np.errstate(over="ignore", invalid="ignore"):
+                R = y - y0 + self._C @ added
             miss = np.abs(R).max()
+            if not np.isfinite(miss):                       # the corrections diverge
+                return None
             if miss < accuracy:
                 return self._columns.update(-self._scale * added)
             if miss > before and halvings:
