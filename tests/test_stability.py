@@ -10,6 +10,7 @@ import formingx as fx
 import formingx.exact.stability as exact
 from formingx.errors import InputError
 from formingx.extensions.stability.second_variation import SecondVariation
+from formingx.extensions.stability.top_load import _slenderness
 from formingx.problem.problem import Problem
 
 
@@ -483,6 +484,16 @@ def test_top_load_finds_the_first_mode_by_itself(wall):
     assert np.all(np.diff(forces, 2) > 0)
     classical = 2 * np.pi * 3.0 * wall**2 / np.sqrt(3 * (1 - 0.25)) * 2       # E = 3 mu, mu = 2 c10; a free edge: half
     assert 0.2 * classical < forces[2] < classical
+
+
+@pytest.mark.parametrize("elements", (12, 40))
+def test_radius_over_wall_of_a_curved_body(elements):
+    """The largest ratio of a parison is at its outer face, whose radius is 1 + h; edges round its end are curved."""
+    for h in (0.3, 0.03, 0.003):
+        body = fx.mesh.parison(inner_radius=1.0, thickness=h, length=2.0, elements=(elements, 1))
+        scene = fx.Scene(mesh=body, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("inner")],
+                         supports=[fx.Symmetry("axis"), fx.Clamped("neck")])
+        assert _slenderness(scene) == pytest.approx((1 + h) / h, rel=1e-9)
 
 
 def test_top_load_of_a_body_on_its_head():

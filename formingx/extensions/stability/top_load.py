@@ -260,18 +260,21 @@ def _default_modes(scene: Scene, slender: float) -> list[float]:
 def _slenderness(scene: Scene) -> float:
     """Return the largest ratio of radius and wall of a body; collective.
 
-    The wall at the middle of an edge is the distance along the inner normal to the opposite edge.
+    The wall at the middle of an edge is the distance along the inner normal to the halves of the other edges.
     """
     edges = Outline(Problem(scene).forms).reference_edges
     a, b, middle = edges.transpose(1, 0, 2)
     along = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]
     normal = np.column_stack([-along[:, 1], along[:, 0]])
-    # the ray middle + s normal meets the chord a + t (b - a)
-    offset, chord = a[None] - middle[:, None], b - a
+    # the ray middle + s normal meets the chord start + t chord of half an edge
+    start, chord = np.concatenate([a, middle]), np.concatenate([middle - a, b - middle])
+    offset = start[None] - middle[:, None]
     cross = normal[:, None, 0] * chord[None, :, 1] - normal[:, None, 1] * chord[None, :, 0]
     with np.errstate(divide="ignore", invalid="ignore"):
         s = (offset[..., 0] * chord[None, :, 1] - offset[..., 1] * chord[None, :, 0]) / cross
         t = (offset[..., 0] * normal[:, None, 1] - offset[..., 1] * normal[:, None, 0]) / cross
-    met = (s > 1e-9 * np.ptp(edges)) & (t >= -1e-9) & (t <= 1 + 1e-9)
+    met = (s > 0) & (t >= -1e-9) & (t <= 1 + 1e-9)
+    own = np.arange(len(edges))
+    met[own, own] = met[own, own + len(edges)] = False             # a curved edge does not meet itself
     wall = np.where(met, s, np.inf).min(axis=1)
     return float(max(np.max(middle[:, 0] / wall), 1.0))
