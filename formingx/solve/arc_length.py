@@ -35,30 +35,16 @@ class Curve(StateSolver):
     """
 
     def plane_normal(self, state: State) -> Array:
-        """Return the normal of the plane in which a step from a state ends, as the gradient of its constraint.
-
-        Args:
-            state: accepted state at the start of the step.
-
-        Returns:
-            Derivative of the constraint with respect to x, locally owned entries, shape (n,).
-        """
+        """Return dc/dx of the plane in which a step from an accepted state ends, owned entries, shape (n,)."""
         self._a.array_w[:] = state.direction
         self.problem.metric_times(self._a, self._b)
         return self._b.array_r.copy()
 
     def guess_from_unloaded(self, unloaded: State, control: float) -> Array:
-        """Return a guess of the unknowns at a control, from the unloaded state.
+        """Return a guess of the unknowns at a control, from the unloaded state; locally owned entries, shape (n,).
 
         The guess has the prescribed displacements at this control, and 0 elsewhere. If the unloaded body has no
         stiffness, such as a flat membrane, the guess is a multiple of the first tangent t instead, with F . t = 0.
-
-        Args:
-            unloaded: the unloaded state, with the first tangent of the path.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            The guess, locally owned entries, shape (n,).
         """
         if not self.problem.singular_unloaded or control == 0:
             return self.problem.motion(control)
@@ -79,59 +65,24 @@ class Curve(StateSolver):
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
              bend: Bend | None = None) -> State:
-        """Return the state after a step of a given arc length (Song 1993, eqs. 4.14 to 4.31).
-
-        The guess lies on the tangent of `old`, at the given length. Newton's method corrects the guess in the plane
-        through it that is normal to the tangent.
-
-        Args:
-            old: accepted state at the start of the step.
-            length: arc length of the step, dimensionless.
-            predictor: function that returns a guess of x at a control, shape (n,), for a step in time. The guess on the
-                tangent is used if `predictor` is None or returns None, and near limit points.
-            earlier: a state before `old` on the same smooth path. The guess then lies on the parabola through both that
-                touches the tangent of `old`. None: the guess lies on the tangent.
-            bend: correction that is added to the guess: (change of x, shape (n,); change of the control); or None.
-
-        Returns:
-            The state, of kind "step".
-
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
-        """
+        """Return the state at an arc length from `old` (Song 1993, eqs. 4.14 to 4.31); raise `Failure` without one.
+        Newton's method corrects a guess on the tangent in the plane normal to it. `earlier` bends the guess to a
+        parabola, and `bend` adds (dx, shape (n,); dcontrol)."""
         plane = self._plane(old, *self._predicted(old, length))
         return self._solve_from(*self._predicted(old, length, earlier, bend), plane, "step", old, predictor)
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the state after a step that ends where a constraint holds, in place of the plane of `step`.
-
-        Args:
-            old: accepted state at the start of the step.
-            length: arc length at which the guess lies, dimensionless.
-            equation: the constraint, such as "quantity = target".
-            predictor: function that returns a guess of x at a control, shape (n,), for a step in time. The guess on the
-                tangent is used if `predictor` is None or returns None, and near limit points.
-            earlier: a state before `old` on the same smooth path. The guess then lies on the parabola through both that
-                touches the tangent of `old`. None: the guess lies on the tangent.
-            bend: correction that is added to the guess: (change of x, shape (n,); change of the control); or None.
-            kind: kind of the new state (`State.kind`).
-
-        Returns:
-            The state.
-
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
-        """
+        """Return the state after a step that ends where `equation` holds, such as "quantity = target", instead.
+        The other arguments and errors are those of `step`."""
         return self._solve_from(*self._predicted(old, length, earlier, bend), equation, kind, old, predictor)
 
     def _predicted(self, old: State, length: float, earlier: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
-        """Return the guess (x, control) of a step from `old`; x: locally owned entries, shape (n,).
+        """Return the guess (x, control) of a step of arc length `length` from `old`; x: owned entries, shape (n,).
 
-        length: arc length of the step. earlier: state before `old`; the guess lies on the parabola through both that
-        touches the tangent of `old`. None: the guess lies on the tangent. bend: correction that is added to the guess:
-        (change of x, shape (n,); change of the control); or None.
+        It lies on the tangent, or on the parabola through the state `earlier`. `bend` adds (change of x, shape (n,);
+        change of the control).
         """
         x, control = old.x + length * old.direction, old.control + length * old.slope
         if earlier is not None:
@@ -146,11 +97,10 @@ class Curve(StateSolver):
 
     def _solve_from(self, x: Array, control: float, constraint: Constraint, kind: str, old: State,
                     predictor: Predictor | None) -> State:
-        """Return the state at which a constraint holds, solved for from the guess (x, control).
+        """Return the state at which a constraint holds, solved for from the guess (x, control), x of shape (n,).
 
-        Away from limit points the predictor replaces the guess of x, and chord iterations are allowed. Near a limit
-        point dF/dx must be new. It gives the direction of the path at each state, from which the limit point is
-        located. kind: `State.kind` of the new state. old: accepted state at the start of the step.
+        Away from limit points the predictor replaces x, and chord iterations are allowed. Near one, dF/dx is new: it
+        gives the direction of the path, from which the limit point is located.
         """
         if predictor is None or not self._is_away_from_limit_point(old.slope):
             return self.solve(x, control, constraint, kind, old)
@@ -161,22 +111,13 @@ class Curve(StateSolver):
         return self.solve(new.x, new.control, constraint, kind, old)
 
     def _is_away_from_limit_point(self, slope: float) -> bool:
-        """Return True if the control contributes more than half of the squared arc length, so no limit point is near.
-
-        slope: derivative of the control with respect to arc length.
-        """
+        """Return True if the control has more than half of the squared arc length; `slope`: dcontrol/ds."""
         return slope**2 * self.control_weight > 0.5
 
     def interpolate(self, a: State, b: State, fraction: float) -> tuple[Array, float]:
-        """Return a point on the cubic (Hermite) through two states with their tangents.
+        """Return (x, control) on the Hermite cubic through two states, at 0 in `a` and at 1 in `b`.
 
-        Args:
-            a: first state.
-            b: second state.
-            fraction: position between them, 0 at a, 1 at b.
-
-        Returns:
-            Unknowns x, locally owned entries, shape (n,); control.
+        x: locally owned entries, shape (n,).
         """
         s, h = fraction, self.distance(a, b)
         weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
@@ -185,19 +126,9 @@ class Curve(StateSolver):
         return x, control
 
     def state_at_value(self, a: State, b: State, quantity: Quantity, target: float) -> State:
-        """Return the state between two states at which an output quantity has a given value.
+        """Return the state of kind "target" between two states at which a quantity has a value in the user's units.
 
-        Args:
-            a: first state.
-            b: second state.
-            quantity: the output quantity.
-            target: the value, in the user's units, between the values of the quantity at a and b.
-
-        Returns:
-            The state, of kind "target".
-
-        Raises:
-            Failure: no such state was found.
+        The value lies between those at `a` and `b`. Raise `Failure` if no such state was found.
         """
         low, high = 0.0, 1.0
         sign = self.value(quantity, a.x, a.control) - target
@@ -210,37 +141,15 @@ class Curve(StateSolver):
         return self.solve(*self.interpolate(a, b, low), quantity.equation(target), "target", a)
 
     def state_at_fraction(self, a: State, b: State, fraction: float) -> State:
-        """Return the state between two states in a plane that is normal to the tangent of the first.
-
-        Args:
-            a: first state.
-            b: second state.
-            fraction: parameter of the Hermite cubic through (x, control) of both states with their tangents, 0 at a, 1
-                at b. The plane goes through the point of the cubic with this parameter.
-
-        Returns:
-            The state, of kind "step".
-
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
-        """
+        """Return the state in the plane normal to the tangent of `a`, at a fraction (0 to 1) of the Hermite cubic.
+        Raise `Failure` if Newton's method fails, or if an element is inverted."""
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
     def state_at_target(self, a: State, b: State, quantity: Quantity, target: Target) -> State:
-        """Return the state between two states that meets a target.
+        """Return the state of kind "target" between two states that meets a target.
 
-        Args:
-            a: first state.
-            b: second state.
-            quantity: output quantity of the target.
-            target: the target.
-
-        Returns:
-            The state, of kind "target".
-
-        Raises:
-            ConvergenceError: no such state was found. Its message tells the user how to set the target before the run.
+        Raise a `ConvergenceError` that says how to set the target before the run if no such state was found.
         """
         try:
             return self.state_at_value(a, b, quantity, target.value)
@@ -249,20 +158,10 @@ class Curve(StateSolver):
                                    f" {failure.reason}; run with intermediate=[...] to have one") from None
 
     def limit_point(self, a: State, b: State) -> State:
-        """Return the state between two states at which the control is stationary.
+        """Return the state of kind "limit point" between two states at which the control is stationary.
 
-        The cubic through both ends gives the guess, and each state found replaces an end. This is repeated until the
-        control is within 1e-12 of its extremum, relative, as estimated from slope and curvature.
-
-        Args:
-            a: state before the limit point.
-            b: state after the limit point.
-
-        Returns:
-            The state, of kind "limit point".
-
-        Raises:
-            Failure: no such state was found.
+        The Hermite cubic gives the guess, and each state found replaces an end. This is repeated until the control is
+        within 1e-12 of its extremum, relative, as estimated from slope and curvature.
         """
         for _ in range(8):
             chord = self.distance(a, b)

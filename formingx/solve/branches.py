@@ -54,12 +54,7 @@ class OrientationCheck:
         return bool(self._lengths) and not self._accepts
 
     def check(self, old: State, new: State) -> None:
-        """Raise `ReversedOrientation` if a step between two states should be repeated with another length.
-
-        Args:
-            old: state at the start of the step.
-            new: state at its end.
-        """
+        """Raise `ReversedOrientation` if the step from `old` to `new` should be repeated with another length."""
         smooth = old.kind in ("step", "target") or old.kind == "start" and not self._curve.problem.singular_unloaded
         if self._accepts or not smooth or not self._lengths and self._curve.distance(old, new) < 2 * self._shortest:
             return
@@ -69,13 +64,7 @@ class OrientationCheck:
             raise ReversedOrientation("a limit point or another path may lie within the step", [])
 
     def next_length(self, length: float) -> float:
-        """Return the length of the next attempt of the step.
-
-        Args:
-            length: arc length of the rejected attempt, dimensionless.
-
-        Returns:
-            Half the length, or the length of the first attempt if it is to be accepted.
+        """Return the arc length of the next attempt: half the rejected one, or the first one if it is to be accepted.
         """
         self._lengths.append(length)
         self._accepts |= length < 2 * self._shortest
@@ -93,19 +82,10 @@ class OrientationCheck:
 
 
 def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, State]]:
-    """Return the pairs of neighbouring states between which another path branches off; collective.
+    """Return the pairs of neighbouring states (before, after) between which another path branches off; collective.
 
-    Between such states the determinant of the tangent changes its sign, and the control has no limit point. The sign at
-    a state follows from `State.orientation`. States solved for at fixed control have no orientation. Then the signs at
-    both ends of each piece between limit points are computed, so an even number of sign changes is missed. For a
-    problem with history variables the list is empty.
-
-    Args:
-        curve: solver of the path.
-        states: the states of the path, in order.
-
-    Returns:
-        Pairs (state before the branch point, state after it).
+    The sign of the determinant follows from `State.orientation`. Without it, signs are computed at both ends of each
+    piece between limit points, so an even number of sign changes is missed.
     """
     if _follow_from_states(curve, states):
         return _orientation_changes(curve, states)
@@ -116,19 +96,9 @@ def branch_points(curve: Curve, states: Sequence[State]) -> list[tuple[State, St
 
 
 def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]) -> list[tuple[State, State]]:
-    """Return the pairs of neighbouring states between which another path branches off.
+    """Return the pairs of neighbouring states with a branch point between them; none with history variables.
 
-    Between them the determinant of dF/dx changes its sign, and the control has no limit point. For a problem with
-    history variables the list is empty.
-
-    Args:
-        curve: solver of the path.
-        states: the states of the path, in order.
-        sign: function that factorises dF/dx at a state and returns the sign of its determinant. It is called only if no
-            state stores this sign (`State.orientation`), at few states.
-
-    Returns:
-        Pairs (state before the branch point, state after it).
+    `sign` factorises dF/dx at a state, and is called only if no state has an orientation.
     """
     if _follow_from_states(curve, states):
         return _orientation_changes(curve, states)
@@ -136,21 +106,12 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
 
 
 def _follow_from_states(curve: Curve, states: Sequence[State]) -> bool:
-    """Return True if the data of the states give the branch points, so no dF/dx has to be factorised for them.
-
-    This is so if a state has a `State.orientation`, from which the sign of the determinant of dF/dx follows. It is also
-    so for a problem with history variables, where no branch points are sought.
-    """
+    """Return True if branch points need no dF/dx, by orientations or since history variables exclude them."""
     return curve.problem.has_history or any(state.orientation for state in states)
 
 
 def warn_of_branches(record: Any, step: Sequence[State]) -> None:
-    """Log a warning for each branch point within a step.
-
-    Args:
-        record: record of the run (`Record`).
-        step: the state from which the step began, and the states that the step added.
-    """
+    """Log a warning for each branch point between the neighbouring states of a step."""
     for before, after in _orientation_changes(record.curve, step):
         log.warning(ANOTHER_PATH, record.describe(before), record.describe(after))
 
@@ -159,8 +120,7 @@ def _orientation_changes(curve: Curve, states: Sequence[State]) -> list[tuple[St
     """Return the pairs of neighbouring states with different `State.orientation`: a branch point lies between them.
 
     Left out are limit points, where the sign of the determinant is round-off, and pairs across a jump or the start of a
-    stage. The sign of the orientation is reversed where a run reverses its direction along the path. For a problem with
-    history variables the list is empty.
+    stage. Where a run reverses its direction along the path, the sign is reversed. None with history variables.
     """
     found: list[tuple[State, State]] = []
     last: State | None = None
@@ -178,15 +138,7 @@ def _orientation_changes(curve: Curve, states: Sequence[State]) -> list[tuple[St
 
 
 def determinant_sign(curve: Curve, solver: DirectSolver) -> Callable[[State], int]:
-    """Return a function that gives the sign of the determinant of the tangent at a state.
-
-    Args:
-        curve: solver of the path.
-        solver: solver that factorises the tangent of the problem and computes its determinant.
-
-    Returns:
-        Function of a `State` that returns 1 or -1, or 0 if the tangent could not be factorised.
-    """
+    """Return a function that gives the sign of det dF/dx at a state: 1, -1, or 0 if the factorisation fails."""
     problem = curve.problem
 
     def sign(state: State) -> int:

@@ -43,13 +43,9 @@ class BorderedTangent:
     slope: float
 
     def __call__(self, V: Array) -> Array:
-        """Map solutions with K to the bordered system, in place.
+        """Map solutions K^-1 E, owned rows, shape (n, m), to the bordered system in place.
 
-        Args:
-            V: the solutions K^-1 E, locally owned rows, shape (n, m).
-
-        Returns:
-            Changes of the control, shape (m,).
+        Return the changes of the control, shape (m,).
         """
         steps: Array = -combined(self.b.comm.tompi4py(), self.gradient.array_r @ V) / self.slope
         V += np.outer(self.b.array_r, steps)
@@ -76,31 +72,15 @@ class BorderedColumns:
         self.steps = border(self._values)
 
     def motions(self, moved: Moved) -> Array:
-        """Return the motions of contact points for each of the m right-hand sides, shape (k, m), length.
-
-        Args:
-            moved: linear function of updates of the unknowns, shape (n, m), and of the control, shape (m,). It returns
-                the k components of the motions relative to the tools, shape (k, m).
-        """
+        """Return the motions of contact points, shape (k, m), length; `moved` maps (dx, dcontrol) to these motions."""
         return np.asfortranarray(moved(self._values, self.steps))         # a column of each force in one piece
 
     def update(self, factors: Array) -> tuple[Array, float]:
-        """Return the updates of unknowns and control that a linear combination of the m right-hand sides gives.
-
-        Args:
-            factors: factors of the right-hand sides, shape (m,).
-
-        Returns:
-            Update of the unknowns, locally owned entries, shape (n,); update of the control.
-        """
+        """Return the updates of x, shape (n,), and of the control by factors of the right-hand sides, shape (m,)."""
         return self._values @ factors, float(self.steps @ factors)
 
     def updates(self, factors: Array) -> Array:
-        """Return the updates of the unknowns that k combinations of the m right-hand sides give, shape (n, k).
-
-        Args:
-            factors: factors of the right-hand sides, a column for each combination, shape (m, k).
-        """
+        """Return the updates of x, shape (n, k), by k columns of factors of the right-hand sides, shape (m, k)."""
         return self._values @ factors
 
 
@@ -133,25 +113,13 @@ class CondensedColumns:
         adjoint.destroy()
 
     def motions(self, moved: Moved) -> Array:
-        """Return the motions of contact points for each of the m right-hand sides, shape (k, m), length.
-
-        Args:
-            moved: linear function of updates of the unknowns, shape (n, m), and of the control, shape (m,). It returns
-                the k components of the motions relative to the tools, shape (k, m).
-        """
+        """Return the motions of contact points, shape (k, m), length; `moved` maps (dx, dcontrol) to these motions."""
         V = np.zeros((self._border.b.getLocalSize(), self._found.shape[1]))
         V[self._rows] = self._found
         return moved(V, np.zeros(V.shape[1])) + np.outer(moved(self._border.b.array_r, 1.0), self.steps)
 
     def update(self, factors: Array) -> tuple[Array, float]:
-        """Return the updates of unknowns and control that a linear combination of the m right-hand sides gives.
-
-        Args:
-            factors: factors of the right-hand sides, shape (m,).
-
-        Returns:
-            Update of the unknowns, locally owned entries, shape (n,); update of the control.
-        """
+        """Return the updates of x, shape (n,), and of the control by factors of the right-hand sides, shape (m,)."""
         rhs, out, step = self._border.b.duplicate(), self._border.b.duplicate(), float(self.steps @ factors)
         rhs.array_w[:] = 0.0
         rhs.array_w[self._rows] = self._E @ factors
@@ -162,27 +130,14 @@ class CondensedColumns:
         return dx, step
 
     def updates(self, factors: Array) -> Array:
-        """Return the updates of the unknowns that k combinations of the m right-hand sides give, shape (n, k).
-
-        Args:
-            factors: factors of the right-hand sides, a column for each combination, shape (m, k).
-        """
+        """Return the updates of x, shape (n, k), by k columns of factors of the right-hand sides, shape (m, k)."""
         return np.array([self.update(column)[0] for column in factors.T]).T
 
 
 def columns(solver: DirectSolver, E: Array, border: Border) -> BorderedColumns | CondensedColumns:
-    """Solve the bordered system for m right-hand sides, by entries of K^-1 if this costs less than m full solutions.
+    """Solve the bordered system for right-hand sides E, locally owned rows, shape (n, m); K is the factorised tangent.
 
-    The bordered system is K dx = E for the tangent K, with the constraint of the step as a further row.
-
-    Args:
-        solver: solver with the factors of the tangent K.
-        E: right-hand sides as columns, locally owned rows, shape (n, m).
-        border: function that maps solutions with K to the bordered system, in place. Entries of K^-1 are used only if
-            it is a `BorderedTangent`.
-
-    Returns:
-        The solutions: an object with `motions`, `update` and `updates`, which evaluate linear combinations of them.
+    Entries of K^-1 are used if they cost less than m solutions and `border` is a `BorderedTangent`.
     """
     worthwhile = len(E) >= CONDENSATION.min_rows and E.shape[1] >= CONDENSATION.min_columns
     if isinstance(border, BorderedTangent) and worthwhile:

@@ -183,16 +183,8 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
              target: float | None = None) -> Diagnosis:
     """Return the diagnosis of a failed run, from its last good state and its failed attempt; collective.
 
-    Args:
-        curve: solver of the path.
-        states: the accepted states; may be empty.
-        reason: how the last attempt ended, as text.
-        attempt: unknowns and corrections at the end of the failed iteration; None if no iteration failed.
-        pace: progress of a run that used up its steps, as text; "" for other failures.
-        target: target of the controlled quantity, in the user's units, or None.
-
-    Returns:
-        The diagnosis, with its findings.
+    reason: how the last attempt ended, as text. pace: progress of a run that used up its steps, as text. target: that
+    of the controlled quantity, in the user's units.
     """
     equations, last = curve.problem, states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states),
@@ -212,15 +204,7 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
 
 
 def limits_passed(problem: Equations, states: Sequence[State]) -> str:
-    """Return a sentence on the limit points of a path, for a message.
-
-    Args:
-        problem: the equations, which give the controlled quantity in the user's units.
-        states: the states of the path.
-
-    Returns:
-        The sentence with the values at the limit points, after a space; "" without limit points.
-    """
+    """Return a sentence with the values at the limit points of a path, after a space; "" without limit points."""
     shown = [problem.shown(state.control) for state in states if state.kind == "limit point"]
     if not shown:
         return ""
@@ -230,18 +214,9 @@ def limits_passed(problem: Equations, states: Sequence[State]) -> str:
 
 def not_reached(record: Any, states: Sequence[State], targets: Any, why: str, diagnosis: Diagnosis,
                 hint: str) -> ConvergenceError:
-    """Return the error of a run that ends before its target.
+    """Return the error of a run that ends before its target, with its diagnosis.
 
-    Args:
-        record: record of the run (`Record`).
-        states: states of the run since its stage began.
-        targets: the targets of the run (`RunTargets`).
-        why: the failure, a sentence.
-        diagnosis: diagnosis of the failure.
-        hint: advice as text, used if the diagnosis has none.
-
-    Returns:
-        The error, with the diagnosis.
+    `states` are those since the stage began, and `hint` is used if the diagnosis has no advice.
     """
     best = int(np.argmin([abs(value - targets.until.value) for value in targets.values]))
     at = f", at {record.describe(states[best])}" * (states[best] is not record.last)
@@ -255,9 +230,8 @@ def not_reached(record: Any, states: Sequence[State], targets: Any, why: str, di
 def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """Return {field of `Diagnosis`: value} for the fields that follow from the tangents of the states.
 
-    These fields are the condition numbers, the sign changes of the determinant of dF/dx, and the limit points. The
-    squared derivative of the control with respect to arc length is linear in the control near a limit point. Its values
-    in the last two states are extrapolated to 0: this gives the control at a limit point ahead.
+    These are condition numbers, sign changes of det dF/dx, and limit points. One ahead is extrapolated from the last
+    two states, since (dcontrol/ds)^2 is linear in the control near it.
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
@@ -385,11 +359,7 @@ def _branch_findings(run: FailedRun) -> Iterator[Finding]:
 
 
 def _singular(facts: dict[str, Any]) -> bool:
-    """Return True if the condition number of the tangent has grown by more than the factor `Limits.singular_ratio`.
-
-    It is compared with the number `Limits.states_before` states earlier. facts: {field of `Diagnosis`: value}, with
-    both numbers as "condition" and "condition_before" if they were computed.
-    """
+    """Return True if the condition number grew by `Limits.singular_ratio` over `Limits.states_before` states."""
     before = facts.get("condition_before")
     return bool(before and (facts.get("condition") or 0) > _LIMITS.singular_ratio * before)
 

@@ -71,12 +71,9 @@ class ActiveSetChanges:
         self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def compare(self, moved: float) -> None:
-        """Compare the active set of this iteration with earlier ones, and update the attributes.
+        """Compare the active set with earlier ones, once after each residual.
 
-        Call it once after each residual.
-
-        Args:
-            moved: size of the last correction, dimensionless; it decides whether a new active set counts in `found`.
+        moved: size of the last correction, which decides whether a new active set counts in `found`.
         """
         self._iteration += 1
         now = self._problem.active_set
@@ -113,43 +110,22 @@ class ModifiedNewton:
         self._before, self._fall = 0.0, 1.0
 
     def note_tangent(self, setting: StepData | None) -> None:
-        """Note that a tangent was factorised, which later iterations may keep.
-
-        Args:
-            setting: step data of the tangent; None if the tangent is singular.
-        """
+        """Note the step data of a factorised tangent, which later iterations may keep; None if it is singular."""
         self._setting = setting
 
     def begin(self, setting: StepData | None, allowed: bool) -> None:
-        """Begin a run of Newton's method.
-
-        Args:
-            setting: current step data. A tangent with other step data is not kept.
-            allowed: True if factorised tangent matrices of earlier iterations may be used in this step.
-        """
+        """Begin a run of Newton's method; only a tangent with the same step data is kept, and only if `allowed`."""
         self._allowed, self._first = allowed, True
         self._fall = self._before if self._setting is setting else 1.0
 
     def keeps(self, residual: float, requested: float) -> bool:
-        """Return True if the next iteration should be a chord iteration with the last tangent.
-
-        Args:
-            residual: current relative residual.
-            requested: tolerance of the relative residual.
-
-        Returns:
-            True if `Newton.max_chords` chord iterations are expected to reach the tolerance.
+        """Return True if `Newton.max_chords` chord iterations are expected to reach the relative residual `requested`.
         """
         ahead = residual * self._fall**self._settings.max_chords
         return self._allowed and self._fall < self._settings.max_residual_ratio and ahead < requested
 
     def note_iteration(self, chord: bool, fall: float) -> None:
-        """Note the convergence of an iteration.
-
-        Args:
-            chord: True if the iteration used the factorised tangent matrix of an earlier one.
-            fall: residual after the iteration over the residual before it.
-        """
+        """Note the ratio of residuals of an iteration, and whether it was a chord iteration."""
         if self._allowed and self._first:
             self._before = fall if chord else self._before / 2
         self._fall, self._first = fall, False

@@ -37,19 +37,13 @@ class JumpRules:
 
     @property
     def allowed(self) -> bool:
-        """True if `rule` lets the body snap through, or if it is "continue" and the path may end at a kink of F.
-
-        The residual F has kinks in contact, and where history variables change.
-        """
+        """True if `rule` snaps, or is "continue" and the path may end at a kink of F (contact, history variables)."""
         may_end = self._problem.has_history or self._problem.has_kinks
         return self.rule in ("snap_through", "continue_volume") or self.rule == "continue" and may_end
 
     @property
     def tried_early(self) -> bool:
-        """True if a snap-through is tried after two failed steps, False if only after the smallest step has failed.
-
-        False for a pressure on a body with history variables, since slip in the viscous motion changes the final state.
-        """
+        """True to snap after two failed steps; with history variables a pressure first tries its smallest step."""
         return self.rule in ("snap_through", *["continue_volume"] * (not self._problem.has_history))
 
     def found_no_equilibrium_near(self, old: State) -> bool:
@@ -58,24 +52,11 @@ class JumpRules:
 
     def jump(self, old: State, length: float, sense: float, passed: Sequence[State], listener: Callable[[], None],
              work_sign: float = 0.0) -> State:
-        """Return the state after a snap-through.
+        """Return the state of kind "jump" after a snap-through from `old`; raise `Failure` if none was found.
 
-        With length 0 and history variables several changes of the control are tried, since contact may converge at one
-        of them only. While unbalanced forces fade, the control goes to 1 at once, where they are 0.
-
-        Args:
-            old: the state from which the body snaps.
-            length: arc length along the tangent of `old` at which the motion starts; 0: at `old` itself.
-            sense: 1 or -1, direction of the control in the run.
-            passed: earlier states of the path, to which the body must not return.
-            listener: function that is called before each viscous solution.
-            work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either.
-
-        Returns:
-            The state, of kind "jump".
-
-        Raises:
-            Failure: no such state was found.
+        The motion starts at arc length `length` along the tangent. With length 0 and history variables several changes
+        of the control are tried, since contact may converge at one of them only. While unbalanced forces fade, the
+        control goes to 1 at once. The work of the controlled load has the sign `work_sign`; 0: either.
         """
         fading, settings = self._problem.setting.fading, self._settings
         others = (settings.control_change, settings.max_control_change) if (
@@ -103,19 +84,8 @@ class JumpRules:
 def at_limit_points(problem: Equations, decreases: bool) -> str:
     """Return the default rule at limit points of the control.
 
-    * "continue": follow the path through limit points. For problems without history variables, except for a pressure on
-      a body in contact.
-    * "continue_volume": follow the path while the enclosed volume grows, and snap where this volume has a maximum. For
-      an increasing pressure on a body with history variables or in contact.
-    * "snap_through": snap to the next equilibrium. For the other problems, and for time as the control: beyond a limit
-      point the control would reverse.
-
-    Args:
-        problem: the equations.
-        decreases: True if the controlled quantity decreases towards 0, such as a pressure that is released.
-
-    Returns:
-        Name of the rule.
+    "continue" follows the path: without history variables, except for a pressure in contact. "continue_volume" snaps at
+    a maximum of the volume: for an increasing pressure with history variables or contact. Else "snap_through".
     """
     if problem.control_kind == "time":
         return "snap_through"
@@ -126,17 +96,9 @@ def at_limit_points(problem: Equations, decreases: bool) -> str:
 
 
 def snaps(curve: Curve, old: State, at_limit_point: str, sense: float) -> bool:
-    """Return True if the body snaps at a state, where the control (or the enclosed volume) begins to reverse.
+    """Return True if the body snaps at a state: its control reverses or, with "continue_volume", its enclosed volume.
 
-    Args:
-        curve: solver of the path.
-        old: the state.
-        at_limit_point: the rule at limit points. With "snap_through" the body snaps where the control reverses, with
-            "continue_volume" where the enclosed volume reverses, too; with other rules it never snaps here.
-        sense: 1 or -1, direction of the control at the start of the run.
-
-    Returns:
-        True if a snap-through should start here.
+    `sense`: direction 1 or -1 of the control at the start of the run.
     """
     if at_limit_point not in ("snap_through",
                               "continue_volume") or old.kind != "limit point" and old.slope * sense >= 0:

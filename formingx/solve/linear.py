@@ -73,14 +73,9 @@ class DirectSolver:
         self._create()
 
     def factorise(self, rescale: bool = True) -> bool:
-        """Factorise the matrix with its current entries.
+        """Factorise the matrix with its current entries, and return False if it is singular to working precision.
 
-        Args:
-            rescale: False keeps the scaling of rows and columns from the last factorisation, if there was one. A new
-                scaling takes MUMPS a fifth of the time. On several ranks MUMPS cannot keep a scaling.
-
-        Returns:
-            False if the matrix is singular to working precision.
+        `rescale` False keeps the last scaling, on one rank; a new one takes MUMPS a fifth of the time.
         """
         self.count += 1
         keep = self._keeps and self._scaled and not rescale
@@ -110,13 +105,9 @@ class DirectSolver:
         self._ksp.solve(rhs, out)
 
     def solve_all(self, rhs: Array) -> Array:
-        """Return the solutions for several right-hand sides, which together take a fraction of the time of single ones.
+        """Return the solutions for right-hand sides as columns, locally owned rows, shape (n, m).
 
-        Args:
-            rhs: the right-hand sides as columns, locally owned rows, shape (n, m).
-
-        Returns:
-            The solutions as columns, locally owned rows, shape (n, m).
+        Together they take a fraction of the time of single ones.
         """
         given, found = self._dense(*rhs.shape)
         sparse = self._sparse(rhs)
@@ -128,15 +119,10 @@ class DirectSolver:
         return found.getDenseArray().copy()
 
     def inverse(self, rows: Array) -> Array | None:
-        """Return entries of K^-1 for the matrix K last factorised.
+        """Return the entries of K^-1 in some rows and columns, ascending, shape (k,), as an array of shape (k, k).
 
-        MUMPS visits only the factors on the way from these rows to the root of its elimination tree.
-
-        Args:
-            rows: numbers of the rows and columns, ascending, shape (k,).
-
-        Returns:
-            The entries, shape (k, k). None on several ranks, or if PETSc has no such function.
+        MUMPS visits only the factors between these rows and the root of its elimination tree. None on several ranks, or
+        if PETSc has no such function.
         """
         get = getattr(_PETSC, "MatMumpsGetInverse", None)
         if get is None or self._matrix.comm.size > 1:
@@ -160,17 +146,11 @@ class DirectSolver:
         self._ksp.solveTranspose(rhs, out)
 
     def sign(self) -> int:
-        """Return the sign of the determinant of the matrix last factorised, 1 or -1, the same on all ranks.
-
-        The solver must have been made with `determinant`.
-        """
+        """Return the sign 1 or -1 of the determinant last factorised, on all ranks; needs `determinant`."""
         return int(np.sign(self._ksp.getPC().getFactorMatrix().getMumpsRinfog(12)))
 
     def negative_pivots(self) -> int:
-        """Return the number of negative pivots of D in the last factors L D L^T, over all ranks.
-
-        The solver must have been made with `inertia`, for a symmetric matrix.
-        """
+        """Return the number of negative pivots of the last L D L^T, over all ranks; needs `inertia`."""
         return int(self._ksp.getPC().getFactorMatrix().getMumpsInfog(12))
 
     def _create(self) -> None:
@@ -221,17 +201,10 @@ class DirectSolver:
 
 
 def condition(matrix: PETSc.Mat, solver: DirectSolver) -> float:
-    """Return a lower bound of the condition number in the 1-norm, |A|_1 |A^-1|_1, of a factorised matrix.
+    """Return a lower bound of the condition number |A|_1 |A^-1|_1 of a matrix A, with `solver` holding its factors.
 
     The norm of the inverse is estimated (Hager 1984; Higham 1988). MUMPS' own error analysis is not available for
     matrices on several ranks.
-
-    Args:
-        matrix: the matrix A.
-        solver: solver with the factors of A.
-
-    Returns:
-        The bound, dimensionless.
     """
     v, y, x = (matrix.createVecRight() for _ in range(3))
     first, last = x.getOwnershipRange()

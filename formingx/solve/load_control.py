@@ -47,15 +47,7 @@ class FixedControl:
         del options[prefix + "snes_linesearch_type"]
 
     def solve(self, x: PETSc.Vec, control: float) -> bool:
-        """Iterate from a guess to a solution of F(x, control) = 0.
-
-        Args:
-            x: the guess; changed in place to the solution.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            False if the iteration did not converge; x is then meaningless.
-        """
+        """Iterate x in place to a solution of F(x, control) = 0; return False without convergence."""
         self._control, self._work, self.history = control, 0.0, []
         self._snes.solve(None, x)
         return bool(self._snes.getConvergedReason() > 0)
@@ -109,32 +101,16 @@ class FixedControlCurve(Curve):
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
              bend: Bend | None = None) -> State:
-        """Return the state at the control old.control + length old.slope, one step after `old`.
-
-        The other arguments of `Curve.step` are not used.
-
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
-        """
+        """Return the state at the control old.control + length old.slope; raise `Failure` if the iteration fails."""
         return self._correct(old, length, "step")
 
     def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
                 earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the state at the control old.control + length old.slope, which must be the target of the control.
-
-        kind: kind of the new state. `equation` and the other arguments of `Curve.step_to` are not used.
-
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
-        """
+        """Return the state at old.control + length old.slope, the target of the control; raise `Failure` without."""
         return self._correct(old, length, kind)
 
     def state_at_fraction(self, a: State, b: State, fraction: float) -> State:
-        """Return the state at the control a.control + fraction (b.control - a.control), with a fraction from 0 to 1.
-
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
-        """
+        """Return the state at the control a.control + fraction (b.control - a.control), with a fraction from 0 to 1."""
         control = a.control + fraction * (b.control - a.control)
         if self._is_unloaded(a):                                 # a slack body has no tangent in its first state
             return self._correct(a, (control - a.control) / a.slope, "step")
@@ -152,10 +128,7 @@ class FixedControlCurve(Curve):
         return state.slope / self.norm(self._a, state.slope)
 
     def plane_normal(self, state: State) -> Array:
-        """Return the derivative of control - target with respect to x: zeros, shape (n,).
-
-        A step ends where this constraint is 0.
-        """
+        """Return zeros, shape (n,): dc/dx of the constraint control = target, at which a step ends."""
         return np.zeros(len(state.x))
 
     def _length_of(self, b: PETSc.Vec) -> float:
@@ -170,8 +143,7 @@ class FixedControlCurve(Curve):
     def _correct(self, old: State, length: float, kind: str) -> State:
         """Return the state of a given kind at the control old.control + length old.slope.
 
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
+        Raise `Failure` if Newton's method fails, or if an element is inverted.
         """
         control = old.control + length * old.slope
         self._x.array_w[:] = self.guess_from_unloaded(old, control) if self._is_unloaded(old) else (

@@ -93,19 +93,10 @@ class LocalSolve:
         self._status = now
 
     def correct(self, solver: DirectSolver, dx: PETSc.Vec, step: float, border: Border) -> float:
-        """Correct a Newton update so that marked points satisfy the contact law, with the compliance of the body.
+        """Correct a Newton update (dx in place, step of the control) so that marked points satisfy the contact law.
 
-        Without marked points, with too many, or without a solution, the update stays as it is.
-
-        Args:
-            solver: solver with the LU factors of the tangent K.
-            dx: update of x, changed in place.
-            step: update of the control.
-            border: function that maps solutions K^-1 E, shape (n, m), to the bordered system in place. It returns the
-                changes of the control, shape (m,).
-
-        Returns:
-            The new update of the control.
+        `solver` has the factors of K. `border` maps K^-1 E, shape (n, m), to the bordered system in place, and returns
+        dcontrol, shape (m,). Return the new step; without a solution nothing changes.
         """
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]
@@ -124,11 +115,9 @@ class LocalSolve:
         return step + step_correction
 
     def _mark_further(self, dx: Array, step: float) -> bool:
-        """Mark the points whose status would change in a Newton update, for the next local solve.
+        """Mark the points whose status would change in a Newton update, dx of shape (n,); True if any rank marked one.
 
-        The direction of sliding that the update gives to marked points is stored for the next linearisation. dx: update
-        of x, locally owned entries, shape (n,). step: update of the control. Return True if any rank marked a new
-        point.
+        The direction of sliding that the update gives to marked points is stored for the next linearisation.
         """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
@@ -146,17 +135,10 @@ V holds dx/dcontrol (then step is 1) or K^-1 E (then step is 0), locally owned r
 
 
 def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> Update | None:
-    """Return a function that updates solutions for changes of the tangent at a few contact points (Woodbury's formula).
+    """Return a function that updates solutions for a few changed contact stiffnesses, shape (n, c, c), stress/length.
 
-    Args:
-        problem: the equations.
-        changes: for each contact, changes of the stiffness per area of its points, shape (n, c, c), stress/length.
-        solver: solver with the LU factors of the tangent K.
-
-    Returns:
-        Function (V, step) that returns V for the changed tangent, or None if this tangent is singular. V is K^-1 E with
-        step 0, or dx/dcontrol with step 1; locally owned rows, shape (n, m). None instead of a function if more points
-        change than `LocalContact.max_changes`: another factorisation then costs less.
+    It maps V = K^-1 E (step 0) or dx/dcontrol (step 1), shape (n, m), to those of the changed tangent, or to None if
+    singular. Return None for more points than `LocalContact.max_changes`: a factorisation then costs less.
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = combined(problem.comm, sum(map(len, chosen)), MPI.SUM)
@@ -170,16 +152,9 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
 
 
 def unit_forces(problem: Equations, contacts: Sequence[FaceContact], chosen: list[Array]) -> Array:
-    """Return the contributions to the residual F of unit forces at contact points, for each component of each point.
+    """Return the residuals of unit forces at chosen owned points of each face, shape (n, m), 0 at constrained unknowns.
 
-    Args:
-        problem: the equations.
-        contacts: the faces in contact.
-        chosen: for each face, local numbers of owned points.
-
-    Returns:
-        Locally owned rows, a column for each force, shape (n, m), 0 at constrained unknowns. The m columns are ordered
-        by rank, face, point and component.
+    The m columns are ordered by rank, face, point and component.
     """
     comm, components = problem.comm, contacts[0].points.shape[1]
     counts = listed(comm, [len(points) * components for points in chosen])
@@ -225,12 +200,7 @@ class _Points:
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
         """Solve for motions of the points that satisfy the contact law and the compliance of the body at them.
 
-        Args:
-            dx: Newton update of x.
-            step: Newton update of the control.
-
-        Returns:
-            Change of dx, locally owned entries, shape (n,); change of step. None if no solution was found.
+        Return the change of dx, locally owned entries, shape (n,), and of step; None if no solution was found.
         """
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._linearised()
@@ -264,23 +234,11 @@ class _Points:
         return None
 
     def _stop_at_edge(self, ramps: list[Any], y: Array, new: Array, entry_depth: Array) -> tuple[Array, bool]:
-        """Shorten a correction of motions that moves points into or out of the ramp, at the outer edge of the ramp.
+        """Shorten a correction of motions y to `new`, shape (k c,), length, at the outer edge of the ramp.
 
-        The stiffness of a sticking point decreases with the slope of the ramp, to zero at its outer edge. A point that
-        is pulled along its tool and hardly pressed is in equilibrium close to this edge. Full corrections would move it
-        out of the ramp and back again, without end.
-
-        Args:
-            ramps: for each face, a function of the motions of its p points, shape (p, c). It returns their depths over
-                the width of the ramp, shape (p,), and the normals times this width, shape (p, c).
-            y: motions of all k points before the correction, shape (k c,), length.
-            new: motions after the full correction, shape (k c,), length.
-            entry_depth: depth over the width of the ramp at which each point stops when it enters the ramp, shape (k,).
-                It is changed in place: it grows for points that enter.
-
-        Returns:
-            Motions after the shortened correction, shape (k c,). True if a point was stopped or all points stick: the
-            correction must then not be halved, since the residual may increase on the way.
+        The stiffness of a sticking point falls to zero there, so full corrections would take a point out and in again.
+        `ramps` give depths and normals; `entry_depth`, shape (k,), grows in place. Also return True if the correction
+        must not be halved: a point was stopped, or all points stick.
         """
         (before, _), (depth, path) = (self._gather_pairs(self._at_faces(ramps, z), (), (self._c,)) for z in (y, new))
         leaves, enters = (before > _LOCAL.min_depth) & (depth <= 0), (before <= 0) & (depth > 0)
@@ -291,16 +249,9 @@ class _Points:
         return new + back.ravel(), bool(back.any() or path.any(axis=1).all())
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
-        """Return solutions for a tangent with other contact stiffnesses than K, by Woodbury's formula.
+        """Return V, shape (n, m), for other contact stiffnesses than in K, by Woodbury's formula; None if singular.
 
-        Args:
-            V: solutions K^-1 E, or dx/dcontrol, locally owned rows, shape (n, m).
-            step: change of the control in V: 0 for K^-1 E, 1 for dx/dcontrol.
-            changes: for each face, changes of the stiffness per area of its p owned points, shape (p, c, c),
-                stress/length.
-
-        Returns:
-            The solutions for the changed tangent, shape (n, m), or None if this tangent is singular.
+        step: change of the control in V. changes: for each face, of its p owned points, shape (p, c, c), stress/length.
         """
         added = self._gather(np.concatenate(changes))
         y = self._with_added_stiffness(added, self._gather(self._moved(V, np.full(V.shape[1], step))))
@@ -310,11 +261,10 @@ class _Points:
         return V - self._columns.updates(self._scale[:, None] * forces)
 
     def _with_added_stiffness(self, added: Array, y: Array) -> Array | None:
-        """Return (1 + C S)^-1 y, shape as y: the motions of the k points if stiffnesses S are added; None if singular.
+        """Return (1 + C S)^-1 y, shape (k c,) or (k c, m): motions with added stiffnesses S; None if singular.
 
-        C is the compliance of the body at the points, shape (k c, k c) for c components; it maps tractions to motions.
-        added: stiffness S of each point, shape (k, c, c), stress/length. y: motions without S, shape (k c,) or, for
-        m solutions, (k c, m).
+        C is the compliance of the body at the points, shape (k c, k c). added: S of each point, shape (k, c, c),
+        stress/length.
         """
         n = len(y)
         J = np.eye(n) + np.einsum("mni,nij->mnj", self._C.reshape(n, -1, self._c), added).reshape(n, n)
@@ -325,52 +275,31 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: Array, step: Array | float) -> Array:
-        """Return the motions of the p locally owned points relative to their tools, shape (p c,), length; collective.
-
-        dx: update of the locally owned unknowns, shape (n,). step: update of the control. For m updates dx has the
-        shape (n, m), step the shape (m,) and the result the shape (p c, m).
-        """
+        """Return the motions of the p owned points by dx, shape (n,) or (n, m), and step; collective.
+        They are relative to the tools, shape (p c,) or (p c, m), length."""
         motions = (c.relative_motion(dx, step)[i] for c, i in zip(self._contacts, self._chosen))
         return np.concatenate([motion.reshape(-1, *dx.shape[1:]) for motion in motions])
 
     def _linearised(self) -> tuple[Array, Array]:
-        """Return the tractions, shape (k c,), and stiffnesses, shape (k, c, c), of all k points in the last iteration.
-
-        They are the values of the contact law at which it was linearised.
-        """
+        """Return tractions, shape (k c,), and stiffnesses, shape (k, c, c), at which the law was linearised."""
         return self._forces([c.increment.last_tractions(i) for c, i in self._some])
 
     def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
-        """Return the tractions, shape (k c,), and stiffnesses, shape (k, c, c), of all k points after a motion.
-
-        laws: for each face, a function that maps motions of its p owned points, shape (p, c), to their `Tractions`.
-        y: motions of all points relative to their tools since the last linearisation, shape (k c,), length.
-        """
+        """Return tractions, shape (k c,), and stiffnesses, shape (k, c, c), after motions y, shape (k c,), length."""
         return self._forces([(tractions.force, tractions.stiffness) for tractions in self._at_faces(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-        """Gather the tractions, shape (k c,), and stiffnesses, shape (k, c, c), of the k points of all ranks.
-
-        parts: for each face, tractions, shape (p, c), and stiffnesses, shape (p, c, c), of its p owned points.
-        """
+        """Gather the tractions, shape (k c,), and stiffnesses, shape (k, c, c), from each face's (p, c), (p, c, c)."""
         force, stiffness = self._gather_pairs(parts, (self._c,), (self._c, self._c))
         return force.ravel(), stiffness
 
     def _at_faces(self, functions: list[Any], y: Array) -> list[Any]:
-        """Evaluate a function of each face at the motions of its p locally owned points; return the list of results.
-
-        functions: for each face, a function of motions, shape (p, c). y: motions of the k points of all ranks, shape
-        (k c,), length.
-        """
+        """Return the results of a function of each face at the motions of its points; y: shape (k c,), length."""
         owned = y[self._own].reshape(-1, self._c)
         return [f(owned[part]) for f, part in zip(functions, self._parts, strict=True)]
 
     def _gather_pairs(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
-        """Return two arrays of values at the k points of all faces and ranks, shape (k, *shape) each; collective.
-
-        parts: for each face, two arrays of values at its p owned points, shape (p, *shape) each. shapes: `shape` of the
-        first and of the second value at one point.
-        """
+        """Return two arrays at the k points of all faces and ranks, shape (k, *shape) each; collective."""
         found = zip(*parts) if parts else ([np.zeros((0, *shape))] for shape in shapes)
         return [self._gather(np.concatenate(part)) for part in found]
 

@@ -108,11 +108,7 @@ class QuantityRun(Run):
         return min(t for t in times if t > time + SAME_TIME * max(abs(time), self._duration))
 
     def _solve_at(self, old: State, time: float) -> State:
-        """Return the state at a process time, one step after the accepted state `old`.
-
-        Raises:
-            Failure: no such state was found.
-        """
+        """Return the state at a process time, one step after the accepted state `old`, or raise `Failure`."""
         problem, problem.clock = self.problem, time
         value = float(self._amplitude(time))
         x, control = self._predicted(old, time, value)
@@ -128,10 +124,9 @@ class QuantityRun(Run):
         return new
 
     def _limit_before(self, old: State, new: State) -> State:
-        """Return the state at which the control has an extremum, at a time between `old` and `new`.
+        """Return the state of a control extremum between two states, solved for in one step from `old`; else `new`.
 
-        The state is solved for in one step from `old`. Without an extremum `new` is returned. Corners of the amplitude,
-        and round-off of a constant control, do not count as extrema.
+        Corners of the amplitude, and round-off of a constant control, do not count as extrema.
         """
         if len(self.states) < 2 or old.time in self._times or old.kind == "limit point":
             return new
@@ -160,10 +155,10 @@ class QuantityRun(Run):
         return new
 
     def _predicted(self, old: State, time: float, value: float) -> tuple[Array, float]:
-        """Return a guess (x, control) of the state at a time, for a step from `old`.
+        """Return a guess (x, control) of the state at a time, by a polynomial in time through the last states.
 
-        The guess lies on the polynomial in time through the last states. If there is only one, the guess lies on its
-        path tangent, at the point where the quantity has the prescribed `value` (user's units).
+        With a single state it is the point on its tangent at which the quantity has the prescribed `value` (user's
+        units).
         """
         past = predictor.recent_states(self.states, time, predictor.CUBIC - self.problem.has_kinks)
         if len(past) == 1:
@@ -172,10 +167,9 @@ class QuantityRun(Run):
         return w @ [s.x for s in past], float(w @ [s.control for s in past])
 
     def _on_tangent(self, old: State, value: float) -> tuple[Array, float]:
-        """Return the point (x, control) on the path tangent of `old` at which the prescribed quantity has a value.
+        """Return the point (x, control) on the tangent of `old` at which the quantity has a value in the user's units.
 
-        value: the value, in the user's units. The point is sought within an arc length of about 1 from `old`, in both
-        directions. If there is none, (x, control) of `old` is returned.
+        It is sought within an arc length of about 1, in both directions; without one, `old` is returned.
         """
         def deviation(s: float) -> float:
             return self.curve.value(self._quantity, old.x + s * old.direction, old.control + s * old.slope) - value
@@ -209,17 +203,9 @@ class QuantityRun(Run):
         return best
 
     def _state_at_target(self, old: State, target: Target, quantity: Quantity, low: float, high: float) -> State:
-        """Return the state, one step after `old`, at which an output quantity meets its target.
+        """Return the state, one step after `old`, at which a quantity meets its target, at a time from `low` to `high`.
 
-        Args:
-            old: the accepted state.
-            target: the target.
-            quantity: its output quantity.
-            low: process time of `old`.
-            high: process time at which the quantity has passed the target.
-
-        Raises:
-            Failure: no such state was found.
+        Raise `Failure` if no such state was found.
         """
         found: dict[float, State] = {}
 

@@ -19,16 +19,7 @@ from .local_contact import LocalSolve, Update, woodbury
 
 
 def relative(equations: Residual, forces: float, floor: float = Newton.force_floor) -> float:
-    """Return the relative norm of unbalanced forces, |F| / (|support forces| + floor).
-
-    Args:
-        equations: the equations, which store the norm of the support forces at the residual last computed.
-        forces: norm |F| of the unbalanced forces, dimensionless.
-        floor: number that is added to the norm of the support forces, dimensionless.
-
-    Returns:
-        The ratio, dimensionless.
-    """
+    """Return the relative norm of unbalanced forces, |F| / (|support forces| + floor), dimensionless."""
     return float(forces / (equations.force_scale + floor))
 
 
@@ -51,14 +42,7 @@ class Iteration(NamedTuple):
 
 
 def tangents(history: list[Iteration]) -> int:
-    """Return the number of Newton iterations with a new tangent.
-
-    Args:
-        history: the iterations; the last entry belongs to the converged state and is not counted.
-
-    Returns:
-        Number of tangents.
-    """
+    """Return the number of iterations with a new tangent; the last entry, the converged state, does not count."""
     return sum(not iteration.chord for iteration in history[:-1])
 
 
@@ -213,11 +197,9 @@ class BorderedNewton:
 
     @contextlib.contextmanager
     def limited_settling(self, limited: bool) -> Iterator[None]:
-        """Return a context in which the active set of contacts with history variables may change in few iterations
-        only.
+        """Return a context in which, if `limited`, contacts with history variables may settle for few iterations only.
 
-        Args:
-            limited: True to allow `Newton.history_settling` iterations only; False to change nothing.
+        Their number is `Newton.history_settling`.
         """
         self._limited = limited and self.problem.has_history
         try:
@@ -226,16 +208,9 @@ class BorderedNewton:
             self._limited = False
 
     def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> bool:
-        """Factorise dF/dx at a solution of F = 0, and store dx/dcontrol along the path in the vector `b`.
+        """Factorise dF/dx at a solution, store dx/dcontrol in `b`, and return False if dF/dx is singular.
 
-        Args:
-            x: unknowns of the solution.
-            control: load parameter (control) of the state, dimensionless.
-            one_sided: True if the next step starts here. At a kink of F, derivatives are then taken on the side to
-                which this step goes.
-
-        Returns:
-            False if dF/dx is singular.
+        one_sided: True to take derivatives at a kink of F on the side of the next step.
         """
         if not self._factorise(x, control, one_sided):
             return False
@@ -259,17 +234,10 @@ class BorderedNewton:
         return good
 
     def update_one_sided(self, x: PETSc.Vec, control: float) -> bool:
-        """Update `b` = dx/dcontrol at a converged solution for the start of the next step, without a factorisation.
+        """Update `b` = dx/dcontrol at a solution for the start of the next step, by Woodbury's formula.
 
-        At a kink of F, dF/dx on the side of the next step differs from the factorised matrix. The difference is the
-        stiffness of a few contact points, such as those whose gap has just closed. Woodbury's formula adds it.
-
-        Args:
-            x: unknowns of the solution.
-            control: load parameter (control) of the state, dimensionless.
-
-        Returns:
-            False if too many points change, or the updated dF/dx is singular; `b` is then unchanged.
+        It adds the changed stiffness of a few contact points. Return False, `b` unchanged, if they are too many or
+        dF/dx is singular.
         """
         update = woodbury(self.problem, self.problem.one_sided_changes(x, control), self.solver)
         found = update and update(self.b.array_r[:, None], 1.0)
@@ -279,36 +247,17 @@ class BorderedNewton:
         return True
 
     def solve_one_sided(self, E: Array) -> Array | None:
-        """Return K^-1 E with the matrix K = dF/dx that the last call of `tangent` or `update_one_sided` computed.
-
-        Args:
-            E: right-hand sides as columns, locally owned rows, shape (n, m).
-
-        Returns:
-            Solutions K^-1 E, locally owned rows, shape (n, m); None if K is singular.
-        """
+        """Return K^-1 E, shape (n, m), with K of the last `tangent` or `update_one_sided`; None if K is singular."""
         V = self.solver.solve_all(E)
         return self._update(V, 0.0) if self._update else V
 
     def correct(self, x: PETSc.Vec, control: float, constraint: Constraint, old: ProblemState | None = None,
                 chords: bool = False) -> tuple[float, list[Iteration]]:
-        """Iterate a guess to a solution of F = 0 and c = 0.
+        """Iterate a guess (x, control) to a solution of F = 0 and of a constraint c = 0; x changes in place.
 
-        Afterwards the vector `b` is dx/dcontrol of the last tangent, which belongs to the last iteration or, with chord
-        iterations, to an earlier one.
-
-        Args:
-            x: guess of the unknowns; changed in place to the solution.
-            control: guess of the load parameter (control), dimensionless.
-            constraint: the constraint c.
-            old: last accepted state, at which contact increments start; None for the first state.
-            chords: True to allow chord iterations, which use the factors of an earlier dF/dx, if F has no kinks.
-
-        Returns:
-            Control of the solution; list of the iterations.
-
-        Raises:
-            Failure: no convergence; x is then meaningless.
+        Return the control and the iterations; raise `Failure` without convergence. `b` is then dx/dcontrol of the last
+        tangent. `old`: accepted state at which contact increments start. chords: True to use earlier factors, if F has
+        no kinks.
         """
         problem = self.problem
         history: list[Iteration] = []
@@ -365,12 +314,9 @@ class BorderedNewton:
             self.F.array_w += self._drag.forces(x.array_r)
 
     def _check(self, history: list[Iteration], active: ActiveSetChanges, moved: float) -> None:
-        """Check the progress of the iteration.
+        """Raise `Failure` if the iteration diverges, cycles or takes too long.
 
         history: iterations so far. active: changes of the active set. moved: size of the last correction.
-
-        Raises:
-            Failure: the iteration diverges, cycles or takes too long.
         """
         settings, quiet = self.settings, history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
@@ -404,13 +350,9 @@ class BorderedNewton:
         return bool(np.isfinite(self.b.norm()))
 
     def _correction(self, x: PETSc.Vec, control: float, constraint: Constraint, history: list[Iteration]) -> float:
-        """Return the correction of the control from the linearised constraint, and correct the vector `a` in place.
+        """Return the correction of the control from the linearised constraint, and add its share times `b` to `a`.
 
-        `a` = -K^-1 F is the correction of x at constant control. The correction of the control times `b` = dx/dcontrol
-        is added to it. history: iterations so far, which a failure stores.
-
-        Raises:
-            Failure: the constraint does not change along the path.
+        Raise `Failure`, with the iterations so far, if the constraint does not change along the path.
         """
         c, c_control = constraint(x, control, self.gradient)
         self._slope = self.gradient.dot(self.b) + c_control
@@ -428,13 +370,9 @@ class BorderedNewton:
 
 
 def fixed(target: float) -> Constraint:
-    """Return the constraint c = control - target.
+    """Return the constraint c = control - target as a function (x, control, gradient): it returns (c, dc/dcontrol).
 
-    Args:
-        target: value of the control, dimensionless.
-
-    Returns:
-        Function (x, control, gradient) that returns (c, dc/dcontrol) and sets `gradient` to dc/dx.
+    It sets `gradient` to dc/dx, zeros.
     """
     def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
         gradient.set(0)

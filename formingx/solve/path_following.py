@@ -77,17 +77,10 @@ class Run:
         self._turned: list[State] = []                      # first state of a run that goes back along the path
 
     def follow(self, max_steps: int | None, progress: bool, start: State | None, may_turn: bool = False) -> None:
-        """Follow the path from a state, or from the last recorded one, until the last target is met.
+        """Follow the path from `start`, or from the last recorded state, until the last target is met.
 
-        Args:
-            max_steps: largest number of steps; None: no limit. In any case the run gives up if many states came no
-                nearer to the target (`RunTargets.patience`).
-            progress: True to show a progress bar.
-            start: first state of the run; None: continue from the last recorded state.
-            may_turn: True if a continued run may go back along the path to a new target.
-
-        Raises:
-            ConvergenceError: the target cannot be reached. The error has no `path` yet; the record holds the states.
+        Raise a `ConvergenceError` without `path` if it cannot be reached; the record holds the states. The run gives up
+        if many states came no nearer to the target. may_turn: True to let a continued run go back along the path.
         """
         record, before = self.record, self.record.counts.steps
         kept: dict[str, Any] = {}

@@ -13,19 +13,11 @@ from .stepping import SAME_TIME
 
 def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers: list[int], stage: Stage,
             clocked: bool = True) -> tuple[list[float], list[float], float]:
-    """Return step data in which the amplitude of one load, support or contact is the control.
+    """Return base, rate and current value for step data with the amplitude of one item as the control.
 
-    All other amplitudes stay constant. An amplitude is base + rate * control.
-
-    Args:
-        amplitudes: current amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
-        scales: value of each in the user's units at amplitude 1, in the same order.
-        numbers: indices in `Scene.items` of the controlled item and of the other contacts of the same tool.
-        stage: the stage, whose speed or duration relates the process time to the control.
-        clocked: True if process time may pass while the control changes.
-
-    Returns:
-        Base and rate of each amplitude, then of the process time (`StepData`); current value of the control.
+    All other amplitudes stay constant. An amplitude is base + rate * control. amplitudes, scales: of all `Scene.items`,
+    then the process time; scales are in the user's units. numbers: indices of the item and of the other contacts of its
+    tool.
     """
     base, rate = list(amplitudes), [0.0] * len(amplitudes)
     control, scale = base[numbers[0]], scales[numbers[0]]
@@ -45,20 +37,10 @@ def control_step_data(amplitudes: list[float], scales: Sequence[float], numbers:
 
 def table_step_data(amplitudes: list[float], scales: Sequence[float], tables: list[tuple[int, Array]], now: float,
              then: float) -> tuple[list[float], list[float]]:
-    """Return step data between two times, between which all tables are linear.
+    """Return base and rate of each amplitude, then of the process time, between two times with linear tables.
 
-    The control is proportional to the time since `now`, where it is 0. At the time `then` it equals the largest change
-    of an amplitude since `now`, or 1 if no amplitude changes. An amplitude is base + rate * control.
-
-    Args:
-        amplitudes: current amplitudes of all loads, supports and contacts (`Scene.items`), then the process time.
-        scales: value of each in the user's units at amplitude 1, in the same order.
-        tables: [(index in `Scene.items`, knots (time, value) in the user's units, shape (n, 2))].
-        now: first process time.
-        then: second process time.
-
-    Returns:
-        Base and rate of each amplitude, then of the process time (`StepData`).
+    The control is proportional to the time since `now`. At `then` it equals the largest change of an amplitude, or 1 if
+    none changes. tables: [(index in `Scene.items`, knots (time, value) in the user's units, shape (n, 2))].
     """
     base, change = list(amplitudes), [0.0] * len(amplitudes)
     for i, table in tables:
@@ -75,29 +57,11 @@ def table_step_data(amplitudes: list[float], scales: Sequence[float], tables: li
 
 
 def end_time(stage: Stage, tables: list[tuple[int, Array]], now: float) -> float:
-    """Return the process time at which a stage with tables or with a duration ends.
-
-    Args:
-        stage: the stage.
-        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))].
-        now: process time at the start of the stage.
-
-    Returns:
-        Process time of the end: of the duration, of the target `until`, or of the longest table.
-    """
+    """Return the process time at the end of a stage: of its duration, its target `until` or its longest table."""
     return now + stage.duration if stage.duration else stage.until.value if stage.until else max(
         table[-1, 0] for _, table in tables)
 
 
 def next_knot(tables: list[tuple[int, Array]], now: float, end: float) -> float:
-    """Return the process time of the next knot in any of several tables.
-
-    Args:
-        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))].
-        now: current process time.
-        end: process time at the end of the stage.
-
-    Returns:
-        The first time of a knot after `now`, at most `end`.
-    """
+    """Return the time of the next knot after `now` in any of several tables, each of shape (n, 2); at most `end`."""
     return min([t for _, table in tables for t in table[:, 0] if now + SAME_TIME * abs(t) < t < end] + [end])

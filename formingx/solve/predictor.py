@@ -13,17 +13,9 @@ CUBIC, QUADRATIC = 4, 3                             # states that a cubic, and a
 
 
 def recent_states(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
-    """Return the last states that are suitable for an extrapolation to a later time, in order.
+    """Return at most `most` last states, none before the last jump, for an extrapolation to a later time.
 
-    Args:
-        states: the accepted states, in order.
-        time: the later time.
-        most: largest number of states to return.
-        close: smallest distance in time of two states, over the length of the step to `time`. Closer states are left
-            out, since they would magnify errors.
-
-    Returns:
-        At most `most` states, none of them before the last jump.
+    States closer in time than `close` times the step are left out, since they would magnify errors.
     """
     found: list[State] = []
     for state in reversed(states):
@@ -35,18 +27,9 @@ def recent_states(states: Sequence[State], time: float, most: int, close: float 
 
 
 def parabola_state(states: Sequence[State], length: float, distance: Callable[[State, State], float]) -> State | None:
-    """Return an earlier state that gives, with the last state and its tangent, a parabola as predictor of a step.
+    """Return an earlier state for a parabola with the last state and its tangent; None if none is suitable.
 
-    It is one of the four states before the last one, at least half the step away from the last one, and no jump lies
-    between them.
-
-    Args:
-        states: the accepted states, in order.
-        length: arc length of the step.
-        distance: function that returns the arc length between two states.
-
-    Returns:
-        The earlier state, or None if no state is suitable.
+    It is one of the four before the last, at least half the step away, without a jump between them.
     """
     for before, after in zip(states[-2:-6:-1], states[:-6:-1]):
         if after.kind == "jump":
@@ -57,15 +40,7 @@ def parabola_state(states: Sequence[State], length: float, distance: Callable[[S
 
 
 def weights(states: Sequence[State], time: float) -> Array:
-    """Return the weights of states in Lagrange's polynomial at a time.
-
-    Args:
-        states: states with increasing times.
-        time: the time at which the polynomial is evaluated.
-
-    Returns:
-        Weights, shape (states,), dimensionless.
-    """
+    """Return the weights, shape (states,), of states with increasing times in Lagrange's polynomial at a time."""
     t = np.array([state.time for state in states])
     apart, ahead = t[:, None] - t, np.tile(time - t, (len(t), 1))
     np.fill_diagonal(apart, 1.0)

@@ -70,16 +70,10 @@ class Execution:
         problem.enter(self._constant, self._unloaded, 0.0)
 
     def run(self, max_steps: int | None, progress: bool) -> None:
-        """Run the remaining stages of the process.
+        """Run the remaining stages of the process, with at most `max_steps` steps for a piece of a stage.
 
-        Args:
-            max_steps: largest number of steps between two changes of the step data (a piece of a stage); None: no
-                limit.
-            progress: True to show a progress bar.
-
-        Raises:
-            ConvergenceError: a stage does not reach its target.
-            InputError: a stage contradicts the current state of the process.
+        Raise `ConvergenceError` if a stage does not reach its target, `InputError` if it contradicts the state of the
+        process.
         """
         self._max_steps, self._progress = max_steps, progress
         last = self.record.last.setting if self.record.states else {"stage": 0, "piece": -1}
@@ -125,10 +119,9 @@ class Execution:
         return found
 
     def _open_targets(self) -> _Targets:
-        """Return the pairs (target, output quantity) of the current stage that are still to be met.
+        """Return the pairs (target, output quantity) of the stage that are still to be met.
 
-        A remeshing within a stage starts a new run. Intermediate targets that this stage met on an earlier mesh are
-        left out.
+        Those that it met before a remeshing are left out.
         """
         met = [s.target[:2] for segment in self.record.segments[:-1] for s in segment.states
                if s.target and s.setting["stage"] == self._k]
@@ -136,10 +129,7 @@ class Execution:
                 if target[:2] not in met or target not in self._stage.intermediate]
 
     def _present(self) -> tuple[StepData, Array, float]:
-        """Return (step data, unknowns, control) of the last accepted state; without one, of the unloaded body.
-
-        The unknowns are locally owned entries, shape (n,).
-        """
+        """Return (step data, unknowns, shape (n,), control) of the last accepted state, or of the unloaded body."""
         last = self.record.last if self.record.states else None
         return self.problem.setting, last.x if last else self._unloaded, last.control if last else 0.0
 
@@ -149,24 +139,18 @@ class Execution:
         return setting.amplitude(number, control) * self.problem.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
-        """Set new step data in the problem for a piece of the current stage, a run with its own step data.
+        """Set new step data in the problem for a piece of the stage; an amplitude is base + rate times the control.
 
-        base, rate: an amplitude is base + rate times the control, for all `Scene.items`, then the process time. piece:
-        number of the piece. control: its value at the current state. fading: True if the forces that a change of the
-        active items leaves out of balance decrease to 0 as the control goes to 1.
+        fading: True if forces of changed items decrease to 0 as the control goes to 1.
         """
         changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
         setting = StepData(base, rate, self._inactive, fading, self._k, piece, changed, self.problem.setting.mesh)
         self.problem.enter(setting, self._present()[1], control)
 
     def _resumed(self, control: float) -> State:
-        """Return the current state of the process as the first state of a run with new step data.
+        """Return the current state as the first of a run with new step data, which has another control and tangent.
 
-        The unknowns are the same, but the control and the tangent of the path depend on the step data. control: value
-        of the control at this state under the new step data.
-
-        Raises:
-            ConvergenceError: the tangent is singular, or no first equilibrium was found.
+        Raise `ConvergenceError` if the tangent is singular, or if no first equilibrium was found.
         """
         if not self.record.states:
             return begin(self.curve)
@@ -183,9 +167,8 @@ class Execution:
     def _trace(self, targets: _Targets, control: float | None, requested: Target | None = None) -> _Targets:
         """Follow the path until the last target is met; return the pairs (target, output quantity) that are still open.
 
-        targets: pairs (target, output quantity). control: value of the control at the current state, where the run
-        starts; None: continue an interrupted run. requested: another target that ends the run if it is met before the
-        last one, or None.
+        control: its value where the run starts; None: continue an interrupted run. requested: another target that may
+        end it first.
         """
         step = self._stage.step or self._step
         if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
@@ -199,10 +182,7 @@ class Execution:
     def _change_items(self, begun: bool) -> None:
         """Change the active loads, supports and contacts of the current stage, and let unbalanced forces fade to 0.
 
-        This is piece 0 of the stage. begun: True to continue it.
-
-        Raises:
-            InputError: an item cannot become active.
+        This is piece 0 of the stage. begun: True to continue it. Raise `InputError` if an item cannot become active.
         """
         before, x, control = self._present()
         start: float | None = None
@@ -233,19 +213,14 @@ class Execution:
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced
 
     def _run_control(self, numbers: list[int], begun: bool) -> None:
-        """Run a stage in which the amplitude of one load, support or contact is the control.
-
-        numbers: indices in `Scene.items` of this item and of the other contacts of the same tool. begun: True to
-        continue the stage.
-        """
+        """Run, or continue if `begun`, a stage whose control is the amplitude of the items `numbers` (of one tool)."""
         control = None if begun else self._enter_control(numbers)
         self._trace(self._open_targets(), control)
 
     def _enter_control(self, numbers: list[int], clocked: bool = True) -> float:
-        """Set step data in which the amplitude of a load, support or contact is the control; return its current value.
+        """Set step data with the amplitude of the items `numbers` as the control; return its current value.
 
-        numbers: indices in `Scene.items` of this item and of the other contacts of the same tool. clocked: True if
-        process time may pass while the control changes. The current value is dimensionless.
+        clocked: True if process time may pass while the control changes.
         """
         base, rate, control = control_step_data(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
         self._enter(base, rate, 1, control)
@@ -262,10 +237,9 @@ class Execution:
         return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
 
     def _prescribe(self, numbers: list[int], begun: bool) -> None:
-        """Run a stage in which a load or tool is adjusted so that an output quantity follows an amplitude in time.
+        """Run, or continue if `begun`, a stage in which an output quantity follows an amplitude in time.
 
-        The quantity and its amplitude are `Stage.prescribed`, or the target `Stage.constant`. numbers: indices in
-        `Scene.items` of the load or of all contacts of the tool. begun: True to continue the stage.
+        The control is the amplitude of the items `numbers`: a load, or all contacts of a tool.
         """
         control = None if begun else self._enter_control(numbers, clocked=False)
         target, amplitude, times = self._prescribed_amplitude(self.problem.setting.base[-1])
@@ -274,13 +248,10 @@ class Execution:
         run.follow(self._max_steps, self._progress, None if control is None else self._resumed(control))
 
     def _prescribed_amplitude(self, now: float) -> tuple[Target, Callable[[float], float], list[float]]:
-        """Return the prescribed amplitude of an output quantity in the current stage, which begins at the time `now`.
+        """Return (target of the quantity, its value by time in the user's units, times to be met) of the current stage.
 
-        The result is (target of the quantity, function of time that returns its value in the user's units, times to be
-        met exactly). The times are the start of the stage, the corners and the end of the amplitude.
-
-        Raises:
-            InputError: the amplitude begins later than the stage, or ends before it.
+        The times are the start of the stage, the corners and the end of the amplitude. Raise `InputError` if the
+        amplitude begins later than the stage, or ends before it.
         """
         stage, end = self._stage, self._stage.until
         if stage.constant and stage.duration:
@@ -300,10 +271,9 @@ class Execution:
         return make_target(float(at(now))), at, [now, *(t for t in corners if now < t < last), last]
 
     def _run_tables(self, tables: list[tuple[int, Array]], piece: int) -> None:
-        """Run a stage with tables, with process time as the control; each piece 1, 2, ... goes to the next knot.
+        """Run a stage with tables in time, piece by piece from knot to knot; `piece`: number to continue, 0 to begin.
 
-        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))]. piece: number of the piece to continue; 0
-        to begin.
+        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))].
         """
         before, _, control = self._present()
         stage, through = self._stage, self._open_targets()
@@ -321,22 +291,15 @@ class Execution:
             now, begun = then, False
 
     def _enter_line(self, tables: list[tuple[int, Array]], now: float, then: float, piece: int) -> None:
-        """Set the step data between two process times, `now` and `then`, between which all tables are linear.
-
-        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))]. piece: number of the piece.
+        """Set the step data of a piece between two process times, between which all tables, shape (n, 2), are linear.
         """
         base, rate = table_step_data(self._amplitudes(), self.problem.scales, tables, now, then)
         self._enter(base, rate, piece, 0.0)
 
     def _run_piece(self, then: float, through: _Targets, begun: bool) -> _Targets:
-        """Run a piece of a stage to its end at time `then`, and return the targets that are still open.
+        """Run, or continue if `begun`, a piece of a stage to time `then`, and return the targets that are still open.
 
-        All tables of the stage are linear in time within a piece.
-
-        through: pairs (target, output quantity) to meet in the piece. begun: True to continue the piece.
-
-        Raises:
-            ConvergenceError: a target that ends the stage was not met within its duration.
+        Raise `ConvergenceError` if a target that ends the stage was not met within its duration.
         """
         if self.problem.setting.is_constant and not self.problem.relaxes:   # only time passes, without an effect
             if not begun:
@@ -355,13 +318,9 @@ class Execution:
         return left
 
     def _check_beginning(self, tables: list[tuple[int, Array]], now: float, end: float) -> None:
-        """Check that tables fit the current process time and the current values of their items.
+        """Raise `InputError` if a table begins in the past or with another value, or if the stage ends in the past.
 
-        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))]. now: process time. end: process time at
-        the end of the stage.
-
-        Raises:
-            InputError: a table begins in the past or with another value, or the stage ends in the past.
+        tables: [(index in `Scene.items`, knots (time, value), shape (n, 2))].
         """
         caller = self._stage.label
         if end <= now:
@@ -380,15 +339,7 @@ class Execution:
 
 
 def is_done(record: Record, plans: list[Plan]) -> bool:
-    """Return True if a run of a process has reached the end of its last stage.
-
-    Args:
-        record: record of the run.
-        plans: the plans of all stages.
-
-    Returns:
-        True if the last state is the end of the last stage.
-    """
+    """Return True if the last state of a run is the end of the last stage."""
     last, plan = record.last, plans[-1]
     if last.setting["stage"] < len(plans) - 1:
         return False
@@ -403,18 +354,10 @@ def is_done(record: Record, plans: list[Plan]) -> bool:
 
 
 def begin(curve: Curve) -> State:
-    """Return the first state of a path: equilibrium with all other loads at the control 0.
+    """Return the first state of a path, of kind "start": equilibrium with all other loads at the control 0.
 
-    Newton's method starts from the unloaded state. If it fails, the constant loads are increased in steps.
-
-    Args:
-        curve: solver of the path.
-
-    Returns:
-        The state, of kind "start".
-
-    Raises:
-        ConvergenceError: no equilibrium was found.
+    Newton's method starts from the unloaded state. If it fails, the constant loads are increased in steps. Raise
+    `ConvergenceError` if no equilibrium was found.
     """
     problem = curve.problem
     try:

@@ -54,32 +54,17 @@ class RunTargets:
         return all(any(target is end for target, _ in self.open) for end in self._ends)
 
     def gained(self, value: float | None = None) -> float:
-        """Return the progress of the run to its last target, (value - first value)/(target - first value).
-
-        Args:
-            value: value of the quantity of the last target, in the user's units; None: its value in the last state.
-
-        Returns:
-            The progress, dimensionless: 0 at the start, 1 at the target, above 1 beyond the target.
-        """
+        """Return (value - first value)/(target - first value), by default at the last state; 1 at the last target."""
         value = self.values[-1] if value is None else value
         return (value - self.values[0]) / ((self.until.value - self.values[0]) or 1.0)
 
     def add_known(self, state: State) -> None:
-        """Append the value of the last target's quantity to `values`, in a state that an interrupted run had reached.
-
-        Args:
-            state: the state.
-        """
+        """Append the value of the last target's quantity in a state that an interrupted run had reached."""
         self.values.append(self._curve.value(self.quantity, state.x, state.control))
         self._best = max(self._best, self.gained())
 
     def accept(self, state: State) -> None:
-        """Append the value of the last target's quantity to `values`, and take the targets that are met out of `open`.
-
-        Args:
-            state: the accepted state.
-        """
+        """Append the value of the last target's quantity to `values`, and remove the targets met from `open`."""
         self.values.append(self._curve.value(self.quantity, state.x, state.control))
         self.open = [(t, b) for t, b in self.open if t is not state.target     # other targets may be met, too
                      and not is_met(t, b.size, self._curve.value(b, state.x, state.control))]
@@ -96,15 +81,9 @@ class RunTargets:
             self.open = [(t, b) for t, b in self.open if t is not target]
 
     def within_reach(self, old: State, length: float) -> tuple[Target | None, Quantity | None, float]:
-        """Return the first open target within a step along the tangent of a state, by linear extrapolation.
+        """Return (target, its quantity, arc length) of the first open target within a step, by linear extrapolation.
 
-        Args:
-            old: the state at the start of the step.
-            length: arc length of the step, dimensionless.
-
-        Returns:
-            (target, its output quantity, arc length to the target); (None, None, length) if no target is within this
-            length.
+        Without one, return (None, None, length).
         """
         best: tuple[Target | None, Quantity | None, float] = (None, None, length)
         for target, quantity in self.open:
@@ -114,12 +93,9 @@ class RunTargets:
         return best
 
     def directed_to_target(self, start: State, first: bool = False) -> State:
-        """Direct the tangent of the first state of a run towards the last target, and return the state.
+        """Direct the tangent of the first state of a run, in place, towards the last target, and return the state.
 
-        Args:
-            start: the state, changed in place.
-            first: True for the unloaded state. If the target is a quantity such as a stretch, whose sign does not
-                change with the control (`Target.signed`), both directions may reach it. The tangent is then kept.
+        In the unloaded state (`first`) it is kept for quantities such as stretch, which both directions reach.
         """
         if self.until.signed or not first:
             left, rate = self._curve.target_residual(self.quantity, self.until.value, start)
@@ -129,15 +105,7 @@ class RunTargets:
         return start
 
     def short_of_targets(self, old: State, change: float) -> float:
-        """Return the change of the control in a snap-through, reduced so that no open target of the control is passed.
-
-        Args:
-            old: state before the snap-through.
-            change: change of the control, dimensionless.
-
-        Returns:
-            Change of the control, dimensionless.
-        """
+        """Return the change of the control in a snap-through, reduced so that no open target of it is passed."""
         for target, quantity in self.open:
             if isinstance(quantity, Amplitude) and quantity.is_controlled:
                 then, now = (self._curve.value(quantity, old.x, c) - target.value
@@ -150,8 +118,7 @@ class RunTargets:
     def turned_back(self) -> str:
         """Return a reason to give up if the path leads away from the last target, else "".
 
-        This is the case if the progress (`gained`) falls below half of its largest value in the run. For a target of
-        the control it must fall below 0, since the control may decrease after a limit point.
+        The progress must have fallen below half of its largest value; below 0 for a target of the control.
         """
         if not self.is_open():
             return ""
@@ -183,11 +150,7 @@ class RunTargets:
         return ""
 
     def pace(self, max_steps: int) -> str:
-        """Return as text the progress of a run that used up its steps, and the number of steps that it still needs.
-
-        Args:
-            max_steps: largest number of steps, all of which were used.
-        """
+        """Return as text the progress of a run that used up its `max_steps`, and the number that it still needs."""
         target, (before, now) = self.until.value, self.values[-2:]
         if not (target - now) * (now - before) > 0:
             return f"max_steps = {max_steps} were used up, and the last step led away from the target"
@@ -226,13 +189,9 @@ class Progress:
         self._gained_then = 0.0
 
     def show(self, gained: float, states: int, length: float) -> None:
-        """Show a completed step.
+        """Show a completed step: progress from 0 to 1, number of states, and length of the next step.
 
-        Args:
-            gained: progress of the run, from 0 at the start to 1 at the target.
-            states: number of states so far.
-            length: length of the next step, dimensionless: an arc length, or a fraction of the duration of a
-                `QuantityRun`.
+        The length is an arc length, or a fraction of the duration of a `QuantityRun`; dimensionless.
         """
         self._gained, self._states, self._length = gained, states, length
         if self._bar is not None:
@@ -242,13 +201,7 @@ class Progress:
         self._log_progress()
 
     def limited(self, reason: str, length: float) -> None:
-        """Show a shortened or failed step.
-
-        Args:
-            reason: the reason, as text.
-            length: length of the next attempt, dimensionless: an arc length, or a fraction of the duration of a
-                `QuantityRun`.
-        """
+        """Show a shortened or failed step, with the reason as text and the length of the next attempt."""
         self._limits[reason] += 1
         self._length = length
         self._log_progress()

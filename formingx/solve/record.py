@@ -132,13 +132,9 @@ class Record:
         return self.segments[-1].states[-1]
 
     def restore(self) -> int:
-        """Restore the step data and history variables of the last accepted state in the problem.
+        """Restore the last accepted state in the problem; return the number of last states with its step data.
 
-        The values of constrained unknowns and the fading forces follow from the first state with the same step data.
-        This first state is therefore restored before the last one.
-
-        Returns:
-            Number of states at the end of the record with the same step data as the last one.
+        The first of these comes first, since constrained values and fading forces follow from it.
         """
         setting = self.last.setting
         states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))
@@ -147,24 +143,16 @@ class Record:
         return len(states)
 
     def continue_from(self, other: Record) -> None:
-        """Begin this record with the states and the costs of another record.
-
-        Args:
-            other: the other record; it is not changed.
-        """
+        """Begin this record with the states and the costs of another record, which is not changed."""
         mine = self.segments[-1]
         *earlier, last = other.segments
         self.segments = [*earlier, Segment(mine.problem, mine.curve, list(last.states))]
         self.counts = replace(other.counts, limits=dict(other.counts.limits))
 
     def accept(self, state: State) -> None:
-        """Accept a state: update the history variables, append the state and call the functions in `hooks.on_state`.
+        """Accept a converged state: update the history variables, append it and call the functions in `hooks.on_state`.
 
-        Args:
-            state: the converged state; its history variables, stage, time and check of admissibility are set.
-
-        Raises:
-            InadmissibleState: no body can have this state. The record is then unchanged.
+        Raise `InadmissibleState` if no body can have this state; the record is then unchanged.
         """
         problem, variables = self.equations, self.equations.history_variables
         problem.advance(state.x, state.control)
@@ -187,13 +175,9 @@ class Record:
         self.counts.steps += state.kind != "start"
 
     def complete_step(self, step: StepControl, until: Target, **entries: Any) -> None:
-        """Complete a step: store in the last state the data with which the run continues, and call `hooks.on_step`.
+        """Store the data with which the run continues in the last state, and call `hooks.on_step`.
 
-        Args:
-            step: control of the step length (`StepControl`) of the next step.
-            until: the target that ends the run.
-            entries: further data {name: value} to store in `State.stepping`, from which the run continues: numbers,
-                lists and dicts that a checkpoint can hold.
+        `entries` are numbers, lists and dicts that a checkpoint can hold.
         """
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               "column": self.equations.shown(0.0)[0].replace(" ", "_"), **entries}

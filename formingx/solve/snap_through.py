@@ -97,29 +97,12 @@ class SnapThrough:
     equilibrium_force: float = 1e-10
 
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
-        """Return the step lengths at which a run tries a snap-through after two failures.
-
-        These are all `lengths`. If all contacts with friction stick, it is the smallest length alone, since shorter
-        steps then succeed without a snap-through.
-
-        Args:
-            limit: limits of a step by contact, or None.
-
-        Returns:
-            Arc lengths, dimensionless, in decreasing order. If steps shorter than one of them fail, one snap-through is
-            tried for it.
-        """
+        """Return the arc lengths of steps at which a snap-through is tried after two failures.
+        If all contacts with friction stick, it is the smallest alone."""
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
     def retry_fraction(self, iterations: int) -> float:
-        """Return the largest fraction of the length of a failed step with which the step is tried again.
-
-        Args:
-            iterations: Newton iterations of the step so far.
-
-        Returns:
-            0.5 after more than the allowed iterations, else 1.0.
-        """
+        """Return the largest fraction of a failed step to try again: 0.5 after too many iterations, else 1."""
         return 0.5 if iterations > self.max_iterations else 1.0
 
 
@@ -150,10 +133,7 @@ class ViscousDrag:
         return self._viscosity.forces(x - self.origin, self.eta)
 
     def add_to(self, tangent: PETSc.Mat) -> None:
-        """Add the derivative eta V of the viscous forces with respect to x to a tangent matrix in place.
-
-        eta: viscosity. V: matrix of a viscous stress with viscosity 1.
-        """
+        """Add eta V, the derivative of the viscous forces, to a tangent matrix in place."""
         self._viscosity.add_to(tangent, self.eta)
 
     def destroy(self) -> None:
@@ -202,18 +182,11 @@ class _Motion:
         return settings.min_viscosity < eta < most and moved < settings.max_total_distance
 
     def move(self, origin: Array, eta: float) -> float:
-        """Solve F(x) + eta V (x - origin) = 0, and take the solution as the new position unless it is rejected.
+        """Solve F(x) + eta V (x - origin) = 0, and take the solution, shape (n,), as the new position unless rejected.
 
-        V is the matrix of a viscous stress with viscosity 1. A solution is rejected if Newton's method fails, an
-        element is inverted, a point passes through a tool, or the work of the controlled load has the wrong sign. The
-        first solution is also rejected if the body moves further than `SnapThrough.repetition_ratio` allows.
-
-        Args:
-            origin: unknowns from which the body moves, locally owned entries, shape (n,).
-            eta: viscosity over the shear modulus.
-
-        Returns:
-            Factor of eta for the next solution: above 1 after a rejected solution.
+        A failure, an inverted element, a point through a tool or work of the wrong sign reject it, and so does a too
+        large first motion. eta: viscosity over shear modulus. Return the factor of eta for the next solution: above 1
+        after a rejected solution.
         """
         settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
@@ -247,23 +220,15 @@ class _Motion:
         return max(1.0 if stays else settings.min_viscosity_factor, far)
 
     def _reject(self, grows: float = 0.0) -> float:
-        """Reject a solution, and return the factor by which the viscosity eta grows.
-
-        After the next solution eta stays constant or grows. grows: the factor; 0: the factor of the settings.
-        """
+        """Reject a solution, and return the factor by which eta grows; `grows` 0: that of the settings."""
         self._wait = True
         return grows or (self._settings.viscosity_growth_in_motion if self.solved else self._settings.viscosity_growth)
 
     def equilibrium(self) -> State | None:
-        """Return the equilibrium state near the current position, solved for without viscous forces.
+        """Return the state of kind "jump" near the current position, without viscous forces; None if none is near.
 
-        Returns:
-            The state, of kind "jump". None if none is near, or if the body moved back to it: against the sign of the
-            work, or to an earlier state of the path.
-
-        Raises:
-            Failure: the iteration fails although the viscous forces have vanished, in a body without history variables.
-                With history variables, the current position then counts as the equilibrium state.
+        None, too, if the body moved back to it. Raise `Failure` if the iteration fails although the viscous forces have
+        vanished; with history variables the position then counts as the state.
         """
         try:
             with self.curve.newton.limited_settling(True):        # after a failure, the viscous motion continues
@@ -290,16 +255,8 @@ class _Motion:
         return bool(self._work_sign) and self.curve.work(a, b) * self._work_sign < 0
 
     def _add_dissipation(self, a: Array, x: Array, pull: Array) -> None:
-        """Add the work of the viscous forces in a motion to `dissipated`, by the trapezoidal rule with one interval.
-
-        More intervals are not used, since the straight line between the positions may pass through tools. Negative work
-        of the force at the start is left out, since viscous forces dissipate energy.
-
-        Args:
-            a: unknowns at the start of the motion, locally owned entries, shape (n,).
-            x: unknowns at the end of the motion, shape (n,).
-            pull: viscous forces eta V (x - origin) at the end of the motion, dimensionless, shape (n,).
-        """
+        """Add the work of viscous forces from a to x, shape (n,), to `dissipated`, by the trapezoidal rule.
+        Negative work of the force at the start is left out; `pull`: forces at the end, shape (n,)."""
         dx = x - a
         self.dissipated += 0.5 * (max(self._sum(self._pull * dx), 0.0) + self._sum(pull * dx))
 
@@ -317,28 +274,11 @@ class _Motion:
 def snap_through(curve: Curve, old: State, change: float, from_tangent: bool, settings: SnapThrough,
                  solutions: int | None = None, listener: Callable[[], None] = lambda: None, work_sign: float = 0.0,
                  passed: Sequence[State] = ()) -> State:
-    """Return the equilibrium state to which the body snaps from a state when the control changes further.
+    """Return the state of kind "jump" to which the body snaps from `old` when the control changes by `change`.
 
-    Args:
-        curve: solver of the path.
-        old: the state from which the body snaps.
-        change: change of the control, dimensionless; its sign is the direction of the process.
-        from_tangent: True to start at the point on the tangent of `old` with the changed control, False to start at
-            `old`.
-        settings: settings of snap-through.
-        solutions: largest number of solutions with viscous forces, after which the snap-through fails; None:
-            `settings.max_solutions`.
-        listener: function that is called before each viscous solution.
-        work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either. At a maximum of the
-            enclosed volume, for example, a growing pressure must find a state with a larger volume.
-        passed: earlier states of the path, to which the body must not return.
-
-    Returns:
-        The state, of kind "jump".
-
-    Raises:
-        Failure: no state was found; `NoEquilibrium` if the body moved but reached no equilibrium. The problem then has
-            the history variables of `old` again.
+    from_tangent: True to start on the tangent of `old`. The work of the controlled load must have the sign `work_sign`
+    (0: either), and the body must not return to the states `passed`. Raise `Failure` if no state was found,
+    `NoEquilibrium` if the body moved without one. The history variables are then those of `old`.
     """
     problem, kept = curve.problem, curve.problem.history_variables
     motion = _Motion(curve, old, old.control + change, settings, work_sign, passed)
@@ -367,18 +307,9 @@ def snap_through(curve: Curve, old: State, change: float, from_tangent: bool, se
 
 
 def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) -> bool:
-    """Return True if a new state lies on an earlier piece of the path, to which a step must not return.
+    """Return True if a new state lies on an earlier piece of the path, within a tenth of the step from `old`.
 
     Pieces before a snap-through do not count, since the history variables differ.
-
-    Args:
-        curve: solver of the path.
-        passed: earlier states of the path, in order.
-        old: the state from which the step started.
-        new: the new state.
-
-    Returns:
-        True if the distance of `new` from the earlier piece is less than a tenth of the step.
     """
     near = 0.1 * curve.distance(old, new)
     states = [] if old.kind == "jump" else passed[::-1]

@@ -107,14 +107,7 @@ class Stage:
         return self.prescribed[0](float(np.max(self.prescribed[1][:, 1])))
 
     def _check(self, amplitudes: Any) -> None:
-        """Check that the arguments of the stage go together.
-
-        Args:
-            amplitudes: the argument `amplitudes` as the user gave it, or None.
-
-        Raises:
-            InputError: the arguments contradict each other, or one is missing.
-        """
+        """Raise `InputError` if arguments of the stage contradict each other, or if one is missing."""
         caller, until = self.label, self.until
         if self.constant is not None and (self.control is None
                                           or self.duration is None or until or amplitudes is not None):
@@ -141,17 +134,10 @@ class Stage:
             raise InputError(f"{caller}: until = {until}: tables are followed until a process_time, or to their end")
 
     def _prescribed(self, amplitudes: Any) -> tuple[Any, Any]:
-        """Return the output quantity to which the control is adjusted, and its amplitude.
+        """Return (function that makes targets, amplitude) of the quantity that the control follows.
 
-        Args:
-            amplitudes: the argument `amplitudes` as the user gave it.
-
-        Returns:
-            (function that makes targets of the quantity, amplitude). The amplitude is a table (time, value), shape (n,
-            2), or a function of time.
-
-        Raises:
-            InputError: the argument is not of this form, or a function of time has no end.
+        The amplitude is a table (time, value), shape (n, 2), or a function of time. Raise `InputError` if the argument
+        has another form, or if a function of time has no end.
         """
         if not isinstance(amplitudes, Mapping) or len(amplitudes) != 1 or not callable(next(iter(amplitudes))):
             raise InputError(f"{self.label}: both control and amplitudes are given: then amplitudes must be {{measure:"
@@ -171,17 +157,10 @@ class Stage:
         return make_target, amplitude
 
     def _tables(self, amplitudes: Any) -> list[tuple[Any, Array]]:
-        """Return the tables that the user gave as amplitudes, as arrays.
+        """Return [(key, knots (time, value) in the user's units, shape (n, 2))] of the user's amplitudes.
 
-        Args:
-            amplitudes: {item: [(time, value), ...]}. An item is a load, support or contact or its name; with `control`,
-                a function that makes targets.
-
-        Returns:
-            [(key of `amplitudes`, knots (time, value) in the user's units, shape (n, 2))].
-
-        Raises:
-            InputError: the argument is not of this form, or its times do not increase.
+        A key is a load, support or contact or its name; with `control`, a function that makes targets. Raise
+        `InputError` for another form, or for times that do not increase.
         """
         if not isinstance(amplitudes, Mapping) or not amplitudes:
             raise InputError(f"{self.label}: amplitudes = {amplitudes!r}: must be {{item: [(time, value), ...]}}")
@@ -240,16 +219,8 @@ class Plan(NamedTuple):
 def plan(scene: Scene, stage: Stage) -> Plan:
     """Return the plan of a stage: the loads, supports and contacts that it names, as indices in `Scene.items`.
 
-    Args:
-        scene: the scene.
-        stage: the stage.
-
-    Returns:
-        The plan, with the controlled and inactive items and the tables.
-
-    Raises:
-        InputError: an item cannot be controlled or is missing in the scene, the body is free to move, or a target
-            cannot be met.
+    Raise `InputError` if an item cannot be controlled or is missing, if the body is free to move, or if a target cannot
+    be met.
     """
     caller = stage.label
     inactive = sorted({i for item in stage.inactive

@@ -50,66 +50,27 @@ class StateSolver:
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
 
     def norm(self, x: PETSc.Vec, control: float) -> float:
-        """Return the arc length of a change (dx, dcontrol) along a straight line.
-
-        It is the root of the mean squared displacement, over the squared size of the body, plus w dcontrol^2 with the
-        weight w = `control_weight`.
-
-        Args:
-            x: change dx of the unknowns.
-            control: change of the load parameter (control), dimensionless.
-
-        Returns:
-            Length, dimensionless.
-        """
+        """Return the arc length of a change (dx, dcontrol): the root of the mean (u/size)^2 plus w dcontrol^2."""
         return float(np.sqrt(self.problem.inner(x, x) + self.control_weight * control**2))
 
     def distance(self, a: State, b: State) -> float:
-        """Return the arc length of the straight line between two states.
-
-        Args:
-            a: first state.
-            b: second state.
-
-        Returns:
-            The length, dimensionless.
-        """
+        """Return the arc length of the straight line between two states, dimensionless."""
         return float(np.sqrt(self._inner(b.x - a.x, b.control - a.control, b.x - a.x, b.control - a.control)))
 
     def moved(self, a: State, b: State) -> float:
-        """Return the mean displacement of the body between two states.
-
-        Args:
-            a: first state.
-            b: second state.
-
-        Returns:
-            Root of the mean squared displacement, over the size of the body.
-        """
+        """Return the root of the mean squared displacement between two states, over the size of the body."""
         self._x.array_w[:] = b.x - a.x
         return self.norm(self._x, 0.0)
 
     def progress(self, old: State, new: State) -> float:
-        """Return the distance between two states along the tangent of the first.
-
-        Args:
-            old: first state.
-            new: second state.
-
-        Returns:
-            Arc length; negative if `new` lies behind `old`.
-        """
+        """Return the arc length from `old` to `new` along the tangent of `old`; negative if `new` lies behind."""
         return self._inner(old.direction, old.slope, new.x - old.x, new.control - old.control)
 
     def start(self) -> State:
-        """Return the state at control 0, in equilibrium with all loads besides the controlled one.
+        """Return the state of kind "start" at control 0, with the tangent of the path.
 
-        Returns:
-            The state, of kind "start", with the tangent of the path.
-
-        Raises:
-            Failure: Newton's method does not converge from the unloaded state.
-            ConvergenceError: the tangent is singular near the unloaded state.
+        Raise `Failure` without convergence from the unloaded state, `ConvergenceError` if the tangent is singular near
+        it.
         """
         history: list[Iteration] = []
         self._x.set(0)
@@ -131,10 +92,9 @@ class StateSolver:
         return self._state(0.0, history, "start", None)
 
     def _is_loaded(self) -> bool:
-        """Return True if the residual F in the reference configuration, stored in the solver, exceeds round-off.
+        """Return True if F in the reference configuration, stored in the solver, exceeds the round-off of stresses.
 
-        Stresses that cancel there leave forces of round-off, eps times the shear modulus times length over thickness.
-        The square root of the norm of dF/dx estimates the last two factors.
+        It is eps times shear modulus times length over thickness, from the root of |dF/dx|.
         """
         forces = self.newton.F.norm()
         if relative(self.problem, forces) <= Tolerances().residual:
@@ -143,17 +103,9 @@ class StateSolver:
         return bool(forces > np.finfo(float).eps * np.sqrt(stiffness))
 
     def resume(self, x: Array, control: float) -> State:
-        """Return a known solution as the first state of a path.
+        """Return a known solution, x of shape (n,), as the first state of a path under the current step data.
 
-        Args:
-            x: unknowns of the solution, locally owned entries, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-
-        Returns:
-            The state, of kind "start", with the tangent of the path under the current step data of the problem.
-
-        Raises:
-            Failure: the tangent is singular.
+        Raise `Failure` if its tangent is singular.
         """
         self._x.array_w[:] = x
         self.problem.residual(self._x, control, self.newton.F)
@@ -168,22 +120,10 @@ class StateSolver:
 
     def solve(self, x: Array, control: float, constraint: Constraint, kind: str, before: State,
               chords: bool = False) -> State:
-        """Return the state that satisfies F = 0 and a constraint.
+        """Return the state that satisfies F = 0 and a constraint, from a guess (x, control), x of shape (n,).
 
-        Args:
-            x: guess of the unknowns, locally owned entries, shape (n,).
-            control: guess of the load parameter (control), dimensionless.
-            constraint: the constraint, such as control = 0.1.
-            kind: kind of the new state (`State.kind`).
-            before: accepted state before the guess; the path tangent of the new state points away from it.
-            chords: True to allow chord iterations, which use the factorised dF/dx of an earlier iteration. They are
-                used only if F has no kinks.
-
-        Returns:
-            The state, with the tangent of the path.
-
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
+        Its path tangent points away from `before`. chords: True to use earlier factors of dF/dx if F has no kinks.
+        Raise `Failure` if Newton's method fails, or if an element is inverted.
         """
         self._x.array_w[:] = x
         self._found = None
@@ -200,18 +140,9 @@ class StateSolver:
         return self._found
 
     def solve_again(self, new: State, equation: Constraint, old: State) -> State:
-        """Solve again for the end of a step, with another constraint or after a change of contact.
+        """Return the end of a step, solved for again from `new`, with another constraint or after a change of contact.
 
-        Args:
-            new: the solved end of the step, used as guess.
-            equation: the constraint.
-            old: accepted state at the start of the step.
-
-        Returns:
-            The state, with the kind, the target and the jump of `new`, and a tangent in the direction of `new`.
-
-        Raises:
-            Failure: Newton's method fails, or an element is inverted.
+        It keeps the kind, target and jump of `new`, and its direction.
         """
         found = self.solve(new.x, new.control, equation, new.kind, old)
         sense = float(np.sign(found.slope * new.slope)) or 1.0
@@ -219,14 +150,10 @@ class StateSolver:
                        jump=new.jump)
 
     def update_path_tangent(self, state: State) -> None:
-        """Compute the path tangent of an accepted state for the next step, with updated history variables.
+        """Compute the path tangent of an accepted state for the next step, in place, with updated history variables.
 
-        The factors of the last iteration are used again if the tangent differs at a few contact points only. There are
-        two exceptions. History variables of a material change the whole tangent. Contact events are predicted with new
-        factors, since a run from a checkpoint has no others, and its events must be the same.
-
-        Args:
-            state: the accepted state; its tangent is changed in place.
+        The last factors are used again if the tangent differs at a few contact points only. Material history needs new
+        ones, and so do contact events, for the same events after a checkpoint.
         """
         self._x.array_w[:] = state.x
         limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
@@ -244,15 +171,9 @@ class StateSolver:
             self._one_sided_state = state, self.newton.solver.count
 
     def factorise_one_sided(self, state: State) -> bool:
-        """Factorise dF/dx for a step from an accepted state, unless this matrix was factorised last.
+        """Factorise dF/dx for a step from an accepted state, on the side of the step, unless it was factorised last.
 
-        At a kink of F the derivative is taken on the side of the step.
-
-        Args:
-            state: the accepted state.
-
-        Returns:
-            False if the matrix is singular.
+        Return False if the matrix is singular.
         """
         if self._one_sided_state != (state, self.newton.solver.count):
             self._x.array_w[:] = state.x
@@ -262,62 +183,29 @@ class StateSolver:
         return True
 
     def value(self, quantity: Quantity, x: Array, control: float) -> float:
-        """Return the value of an output quantity.
-
-        Args:
-            quantity: the quantity.
-            x: unknowns, locally owned entries, shape (n,).
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            The value, in the user's units.
-        """
+        """Return the value of a quantity in the user's units; x: locally owned entries, shape (n,)."""
         self._b.array_w[:] = x
         return float(quantity.value(self._b, control))
 
     def target_residual(self, quantity: Quantity, target: float, state: State) -> tuple[float, float]:
-        """Return the residual c of the constraint "quantity = target" at a state, and dc/ds along the tangent.
+        """Return (c, dc/ds) of "quantity = target" along the tangent of a state; -c/(dc/ds) is the length to it.
 
-        From both follows the arc length to the target, -c / (dc/ds), by linear extrapolation. Differences of the
-        quantity at points on the tangent would be far from dc/ds for a contact force, which is stiff.
-
-        Args:
-            quantity: the output quantity.
-            target: its target, in the user's units.
-            state: the state.
-
-        Returns:
-            (c, dc/ds); s is the arc length. c is 0 at the target; only the ratio of both values has a meaning, since
-            each quantity scales its constraint by a factor of its own.
+        Only their ratio has a meaning. A difference quotient would be far from dc/ds for a stiff contact force.
         """
         self._a.array_w[:], self._b.array_w[:] = state.x, state.direction
         left, by_control = quantity.equation(target)(self._a, state.control, self.newton.gradient)
         return left, self.newton.gradient.dot(self._b) + by_control * state.slope
 
     def unit_slope(self, state: State) -> float:
-        """Return the derivative of the control with respect to arc length.
-
-        Args:
-            state: the state at which the derivative is taken.
-
-        Returns:
-            Derivative dcontrol/ds along the tangent of the state.
-        """
+        """Return dcontrol/ds along the tangent of a state."""
         return state.slope
 
     def work_rate(self, state: State) -> float:
-        r"""Return the rate of work of the controlled load along the path, for a unit of the control.
+        r"""Return the rate of work of the controlled load along the path, for a unit of the control; dimensionless.
 
         .. math:: -\frac{\partial F}{\partial \lambda} \cdot \frac{dx}{ds}
 
-        F is the residual, lambda the control and s the arc length, all dimensionless.
-
-        Args:
-            state: the state, at whose tangent dx/ds the rate is taken.
-
-        Returns:
-            Rate of work, dimensionless. For a pressure it is proportional to the derivative of the enclosed volume with
-            respect to arc length.
+        For a pressure it is proportional to the derivative of the enclosed volume with respect to arc length.
         """
         self._x.array_w[:] = state.x
         self._b.array_w[:] = state.direction
@@ -325,19 +213,10 @@ class StateSolver:
         return -float(self.newton.F_control.dot(self._b))
 
     def work(self, a: State, b: State) -> float:
-        r"""Return the work of the controlled load from state a to state b, for a unit of the control.
+        r"""Return the work of the controlled load from state a to state b, for a unit of the control; dimensionless.
 
         .. math:: -\frac{1}{2} \left(\left.\frac{\partial F}{\partial \lambda}\right|_a +
             \left.\frac{\partial F}{\partial \lambda}\right|_b\right) \cdot (x_b - x_a)
-
-        This is the trapezoidal rule with one interval. F is the residual, lambda the control, both dimensionless.
-
-        Args:
-            a: first state.
-            b: second state.
-
-        Returns:
-            Work, dimensionless.
         """
         done = 0.0
         for state in (a, b):
@@ -348,11 +227,7 @@ class StateSolver:
         return done
 
     def spend(self, iterations: int) -> None:
-        """Count the Newton iterations of another solver for the current step.
-
-        Args:
-            iterations: number of iterations, such as those with viscous forces.
-        """
+        """Count iterations of another solver, such as those with viscous forces, for the current step."""
         self._iterations += iterations
 
     @property
@@ -361,11 +236,7 @@ class StateSolver:
         return self._iterations
 
     def spent(self) -> int:
-        """Return the number of Newton iterations since the last call, and start to count anew.
-
-        Returns:
-            Number of iterations, failed attempts included.
-        """
+        """Return the number of iterations since the last call, failed attempts included, and count anew."""
         spent, self._iterations = self._iterations, 0
         return spent
 

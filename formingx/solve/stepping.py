@@ -86,17 +86,9 @@ class StepControl:
 
 
 def allowed(caller: str, accuracy: str | float) -> float:
-    """Return the relative error that an accuracy allows.
+    """Return the relative error of stress and thickness that an accuracy allows.
 
-    Args:
-        caller: name of the calling function, for messages.
-        accuracy: "draft", "standard" or "fine" (`ACCURACY`), or the relative error itself, between 0 and 1.
-
-    Returns:
-        The relative error of stress and thickness.
-
-    Raises:
-        InputError: an accuracy that is neither of both.
+    accuracy: "draft", "standard" or "fine" (`ACCURACY`), or the error itself, between 0 and 1; else `InputError`.
     """
     if isinstance(accuracy, str):
         if accuracy not in ACCURACY:
@@ -122,18 +114,7 @@ class TimeError:
         self._once, self._adding_up = once * accuracy, adding_up * accuracy**1.5
 
     def ratio(self, states: Sequence[State], x: Array, control: float) -> float:
-        """Return the time integration error of a step over its tolerance.
-
-        It is the larger of two ratios, of the error at the end of the step and of its part that persists in later
-        steps.
-
-        Args:
-            states: the accepted states; the step starts from the last one.
-            x: unknowns at the end of the step, locally owned entries, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            The ratio; 0 if no time passes in the step.
+        """Return the error of a step, at its end or persistent, over its tolerance; x: shape (n,). 0 if no time passes.
         """
         time = self._problem.time_at(control)
         past = predictor.recent_states(states, time, predictor.QUADRATIC - 1)
