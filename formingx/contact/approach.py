@@ -85,34 +85,16 @@ class Approach:
         self._bonded_from: np.ndarray = np.ones(len(face.rule.points))      # fraction of the step; 1: not in the step
 
     def touches(self, fields: np.ndarray, control: float) -> bool:
-        """Return True if any point of the face is in contact with the tool.
-
-        Args:
-            fields: locally owned unknowns of the state, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-
-        Returns:
-            True if a point on any rank is in contact.
-        """
+        """Return True if a point of the face, on any rank, is in contact; fields: owned unknowns, shape (n,)."""
         return bool(combined(self._comm, bool(self.face.touching(fields, control).any()), MPI.LOR))
 
     def step_length(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
                     length: float) -> float:
-        """Return the admissible arc length of a step along a tangent.
+        """Return the arc length, at most `length`, of a step along (direction, slope), d/ds of (fields, control).
 
-        The step ends where `max_closures` new points have come into contact. If at most one point was in contact
-        before, it ends at the first gap closure. If a whole region came into contact in one step, its sticking
-        positions would depend on the step length.
-
-        Args:
-            fields: locally owned unknowns of the state, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-            direction: derivative of the unknowns by arc length, shape (n,).
-            slope: derivative of the control by arc length.
-            length: largest arc length.
-
-        Returns:
-            Arc length, at most `length`.
+        fields, direction: locally owned unknowns, shape (n,). The step ends where `max_closures` new points have come
+        into contact, or at the first gap closure if at most one point was in contact. If a whole region came into
+        contact in one step, its sticking positions would depend on the step length.
         """
         face = self.face
         start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
@@ -126,26 +108,16 @@ class Approach:
         return min(LIMITS.overshoot * arc_lengths[allowed - 1], length) if len(arc_lengths) >= allowed else length
 
     def _within_motion(self, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> float:
-        """Return the arc length, at most `length`, within which a tangent predicts gap closures; by default `length`.
-
-        start, velocity: positions of the points and their derivatives by arc length. free: mask of the open points.
-        """
+        """Return the arc length within which a tangent predicts gap closures; by default `length`.
+        start, velocity: positions of points and d/ds, shape (n, c). free: mask of the open ones."""
         return length
 
     def closures(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
                  length: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the gap closures of the points if they move along a tangent.
+        """Return the gap closures of the n owned points along a tangent (direction, slope), d/ds of (fields, control).
 
-        Args:
-            fields: locally owned unknowns of the state, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-            direction: derivative of the unknowns by arc length, shape (n,).
-            slope: derivative of the control by arc length.
-            length: arc length of the step.
-
-        Returns:
-            For each locally owned point, the arc length at which its gap closes, shape (n,); `length` for points that
-            are closed or stay open. Their positions at this arc length, relative to the tool, shape (n, c), length.
+        For each point the arc length, shape (n,), `length` for points that are closed or stay open, and the position
+        there relative to the tool, shape (n, c), length.
         """
         face = self.face
         start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
@@ -155,18 +127,11 @@ class Approach:
 
     def prepare(self, arc_lengths: np.ndarray, places: np.ndarray, length: float, ends: bool,
                 guessed: np.ndarray | None = None, speeds: np.ndarray | None = None) -> None:
-        """Prepare the solve of a step: store the predicted positions at which gaps close.
+        """Store the predicted positions `places`, shape (n, c), length, of gap closures at `arc_lengths`, shape (n,).
 
-        Args:
-            arc_lengths: arc lengths at which gaps close, shape (n,); `length` for gaps that stay open.
-            places: positions of the points at these arc lengths, relative to the tool, shape (n, c), length.
-            length: arc length of the step (dimensionless).
-            ends: True if `StepLimit.check` may shorten the step to one of its gap closures. A sticking point whose gap
-                closes near the end of the step (`StepLimits.friction_fraction`) then carries friction in the next step
-                only. It carries friction at once if its predicted slip is too large (`StepLimits.max_slip_ratio`).
-            guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
-            speeds: derivatives of the positions by arc length just before the predicted closures, shape (n, c), length;
-                None: unknown.
+        speeds: d(position)/ds before the closures, shape (n, c). guessed: mask of points with predicted forces. ends:
+        True if `StepLimit.check` may shorten the step to a closure. A late closure (`StepLimits.friction_fraction`)
+        then carries friction in the next step only, unless its slip is too large (`StepLimits.max_slip_ratio`).
         """
         face = self.face
         self._predicted_closures = combined(self._comm, int(np.sum(arc_lengths < length)), MPI.SUM)
@@ -189,14 +154,8 @@ class Approach:
     def rejection(self, old: Any, new: Any, n: int, length: float, ends: bool) -> StepRejection | None:
         """Return the rejection of a solved step that is too long for this contact, or None.
 
-        Args:
-            old: accepted state at the start of the step.
-            new: converged state at its end.
-            n: number of locally owned unknowns of the fields.
-            length: arc length of the step.
-            ends: True to also reject a step after whose gap closure a point slips wrongly. A sticking point then slips
-                too far without friction, or a sliding point slides against its slip since the closure. The repeated
-                step ends at this gap closure.
+        n: number of locally owned unknowns. ends: True to also reject a step after whose gap closure a point slips
+        wrongly (`fraction_to_wrong_slip`). The repeated step ends at this gap closure.
         """
         x, control = new.x[:n], new.control
         if self.has_too_many_closures(old.x[:n], old.control, x, control):
@@ -215,19 +174,9 @@ class Approach:
         return None
 
     def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """Return True if too many points came into contact in a step.
+        """Return True if too many points came into contact in a step; old, new: owned unknowns, shape (n,).
 
-        The limit is 2 plus twice the larger of `max_closures`, allowed in a step, and the number of predicted gap
-        closures. Contacts without history variables have no limit.
-
-        Args:
-            old: locally owned unknowns at the start of the step, shape (n,).
-            old_control: control at the start of the step.
-            new: locally owned unknowns at its end, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            True if the step is too long.
+        The limit is 2 plus twice the larger of `max_closures` and the number predicted; none without history variables.
         """
         face, theta = self.face, self.face.law.theta
         if face.history is None:
@@ -237,16 +186,10 @@ class Approach:
         return bool(combined(self._comm, found, MPI.SUM) > 2 * max(self.max_closures, self._predicted_closures) + 2)
 
     def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
-        """Return True if sticking points lifted off and moved back along the tool while other gaps closed.
+        """Return True if sticking points lifted off and moved along the tool while other gaps closed, on any ranks.
 
         The positions at which gaps close depend on the points that still stick. A long step gets these positions wrong.
-
-        Args:
-            new: locally owned unknowns at the end of the step, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            True if both happened in the step, on any ranks.
+        new: owned unknowns at its end, shape (n,).
         """
         face, theta, history = self.face, self.face.law.theta, self.face.history
         if history is None or not face.contact.sticks or face.law.adhesive:
@@ -260,32 +203,14 @@ class Approach:
         return bool(np.all(found > 0))
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """Return True if the straight path of a point in a step, relative to the tool, leads through the tool.
-
-        Args:
-            old: locally owned unknowns at the start of the step, shape (n,).
-            old_control: control at the start of the step.
-            new: locally owned unknowns at its end, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            True if the depth on a path exceeds the larger depth of its ends by more than `StepLimits.max_cut_ratio`
-            times the tributary length of the point.
-        """
+        """Return True if the straight path of a point, relative to the tool, leads through it (`cuts_tool`)."""
         return self.cuts_tool(self.face.positions(old, old_control), self.face.positions(new, control))
 
     def cuts_tool(self, a: np.ndarray, b: np.ndarray) -> bool:
-        """Return True if the straight path of a point between two positions penetrates the tool too deeply.
+        """Return True if a straight path from a to b, relative to the tool, shape (n, c), length, is too deep in it.
 
         The depth on the path may exceed the larger depth of its ends by `StepLimits.max_cut_ratio` times the tributary
-        length. A point that slides over an edge of the tool may cut the edge off by this depth.
-
-        Args:
-            a: positions of the points at the start, relative to the tool, shape (n, c), length.
-            b: positions at the end, shape (n, c), length.
-
-        Returns:
-            True if a path on any rank is too deep.
+        length. A point that slides over an edge may cut the edge off by this depth. The result holds for all ranks.
         """
         law, lengths = self.face.law, self.face.rule.lengths
         path_length, most = np.linalg.norm(b - a, axis=1), LIMITS.max_cut_ratio * lengths
@@ -300,17 +225,10 @@ class Approach:
         return bool(combined(self._comm, found, MPI.LOR))
 
     def fraction_to_lost_bond(self, new: np.ndarray, control: float) -> float:
-        """Return the fraction of a step after which the first gap closes whose point is open again at its end.
+        """Return the fraction of a step to the first gap closure whose point is open again at its end; else 1.
 
-        A point that cannot separate is bonded from the first accepted state after its gap closure on. A tension in the
-        step of the closure opens it. The step should therefore end at the closure.
-
-        Args:
-            new: locally owned unknowns at the end of the step, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            Fraction of the arc length up to the first such gap closure; 1 without such points.
+        A point that cannot separate is bonded from the first accepted state after its closure on: the step should end
+        there.
         """
         if not self.face.law.adhesive:
             return 1.0
@@ -319,22 +237,12 @@ class Approach:
 
     def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
                                length: float) -> float:
-        """Return the fraction of a step at which the first gap closes whose point then slips wrongly.
+        """Return the fraction of a step to the first gap closure whose point then slips wrongly; 1 without such points.
 
-        A sticking point slips wrongly if it carries no friction in the step, but moves along the tool after its gap
-        closure. `StepLimits.max_slip_ratio` limits this motion. A point with Coulomb friction slips wrongly if it
-        slides, at the end of the step, against its slip since the gap closure. Pressure and slip are assumed to grow
-        linearly from the gap closure, with their rates along (direction, slope).
-
-        Args:
-            new: locally owned unknowns at the end of the step, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-            direction: derivative of the unknowns by arc length at the end, shape (n,).
-            slope: derivative of the control by arc length at the end.
-            length: arc length of the step.
-
-        Returns:
-            Fraction of the arc length up to the first such gap closure; 1 without such points.
+        A sticking point slips wrongly if it moves along the tool by more than `StepLimits.max_slip_ratio` without
+        friction. A point with Coulomb friction does so if it slides against its slip since the closure. Pressure and
+        slip are assumed to grow linearly from there, with rates along (direction, slope), d/ds of the unknowns, shape
+        (n,), and the control.
         """
         face, law, history = self.face, self.face.law, self.face.history
         if history is None or not law.has_friction:

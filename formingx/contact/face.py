@@ -66,20 +66,13 @@ class FaceContact:
         self.start()
 
     def enter(self, base: float, rate: float, active: bool) -> None:
-        """Set the step data of a stage.
-
-        Args:
-            base: travel of the tool at control 0, over the length scale of the forms.
-            rate: its derivative by the control.
-            active: True if the contact is active in the stage.
+        """Set the travel of the tool at control 0 and its derivative, over the length scale, and whether it is active.
         """
         self._base, self._rate, self.active = base, rate, active
 
     def shift_distances(self, shift: np.ndarray) -> None:
-        """Reduce the signed distances from the tool, positive inside, by `shift`, shape (n,), length.
-
-        After a remeshing, the contact law thus gives the pressures of the old mesh at the new positions.
-        """
+        """Reduce the distances from the tool by `shift`, shape (n,), length.
+        A remeshed body thus keeps its pressures."""
         self.shift = shift
         self.law = self._law(self._penalty)
 
@@ -88,28 +81,18 @@ class FaceContact:
         return None if self._warm is None else self.rule.at_points(self._solid.temperature.at_nodes(self._warm))
 
     def update_temperature(self) -> None:
-        """Update the coefficient of friction at the points to the current temperature of the body.
-
-        Raises:
-            InputError: friction has no finite value at a temperature.
-        """
+        """Update friction to the temperature of the body; raise `InputError` if it has no finite value."""
         if self._warm is not None:
             self.law = self.law.with_friction(self.contact.friction_at(self._temperatures(), clamped=True))
             self.increment = Increment(self.law, self.history)
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the points, shape (n, components), in the unit of `values`; collective.
-
-        values: locally owned unknowns, shape (m,). With k columns, (m, k), the result is (n, components, k).
-        """
+        """Return the displacement of the points, shape (n, components) or (n, components, k), in the unit of `values`.
+        values: locally owned unknowns, shape (m,) or (m, k). Collective."""
         return self.rule.displacement(values)
 
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the positions of the points relative to the tool in a state.
-
-        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless. The
-        result is reference position plus displacement minus travel of the tool, shape (n, components), length.
-        """
+        """Return the positions of the points relative to the tool, shape (n, components), length; fields: owned."""
         return self.points + self._length * self.displacement(fields) - self.tool_displacement(control)
 
     def tool_displacement(self, control: float) -> np.ndarray:
@@ -122,27 +105,17 @@ class FaceContact:
         return bool(self._rate)
 
     def relative_motion(self, dx: np.ndarray, step: np.ndarray | float) -> np.ndarray:
-        """Return the motion of the points relative to the tool in a change of the state, shape (n, components), length.
-
-        Args:
-            dx: change of the locally owned unknowns, shape (m,), or (m, k) for a result of shape (n, components, k).
-            step: change of the control, a number, or shape (k,) with k columns of dx.
-        """
+        """Return the motion relative to the tool by dx, shape (m,) or (m, k), and step.
+        The shape is (n, components) or (n, components, k), in length."""
         motion = self._length * self.displacement(dx)
         return motion - np.multiply.outer(self._travel_vector, self._rate * step) if self._rate else motion
 
     def tractions(self, fields: np.ndarray, control: float) -> Tractions:
-        """Return the contact tractions at the points in a state; after `linearise` there, of the linearised law.
-
-        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
-        """
+        """Return the contact tractions in a state; after `linearise` there, those of the linearised law."""
         return self.increment.tractions(self.positions(fields, control))
 
     def touching(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return a mask of the points that are in contact with the tool in a state, shape (n,).
-
-        fields: locally owned unknowns of the state. control: its load parameter (control), dimensionless.
-        """
+        """Return a mask of the points in contact, shape (n,); fields: locally owned unknowns of the state."""
         return self.law.touching(self.positions(fields, control), self.history)
 
     @property
@@ -162,10 +135,7 @@ class FaceContact:
 
     @property
     def stiffness_in_tangent(self) -> np.ndarray:
-        """Derivative of the forces in the residual by the positions of their points, in the last tangent, 1/length.
-
-        Shape (n, components, components).
-        """
+        """d(nodal force)/d(position) in the last tangent, shape (n, components, components), 1/length."""
         return self._scale[:, None, None] * self._in_tangent
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
@@ -177,12 +147,7 @@ class FaceContact:
         self._applied = forces
 
     def begin(self, old: np.ndarray | None, control: float = 0.0) -> None:
-        """Begin an increment: Newton's method starts from an accepted state; collective.
-
-        Args:
-            old: locally owned unknowns of the accepted state; None: the increment only evaluates states.
-            control: load parameter (control) of the accepted state, dimensionless.
-        """
+        """Begin an increment from an accepted state, owned unknowns `old`; None: only evaluate states; collective."""
         if self.contact.present_area and old is not None:   # the area of a sheet grows as its wall thins
             self._set_penalty(np.maximum(self.rule.area_ratio(old), 1.0) ** 2)
         start = None if old is None else self.positions(old, control)
@@ -193,54 +158,28 @@ class FaceContact:
         self.increment = Increment(self.law.without(points), self.history)
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
-        """Add the contact forces in a state to the residual.
-
-        Args:
-            values: locally owned entries of the residual F, changed in place.
-            fields: locally owned unknowns of the state.
-            control: load parameter (control) of the state, dimensionless.
-        """
+        """Add the contact forces in a state to the residual `values`; both with locally owned entries."""
         force = self._scale[:, None] * self.tractions(fields, control).force
         self.add(values, force if self._applied is None else np.where(np.isnan(self._applied), force, self._applied))
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
-        """Linearise the contact law for a Newton iteration at a state, and update the residual.
-
-        Args:
-            values: locally owned entries of the residual F, shape (m,), changed in place. The forces of the linearised
-                law replace those of the law.
-            fields: locally owned unknowns of the state.
-            control: load parameter (control) of the state, dimensionless.
-        """
+        """Linearise the law at a state; its forces replace those of the law in `values`, shape (m,)."""
         self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
 
     def tangent(self, fields: np.ndarray, control: float, one_sided: bool = False) -> np.ndarray:
-        """Return the derivative of the contact forces by the unknowns, and store it as the last tangent.
-
-        Args:
-            fields: locally owned unknowns of the state.
-            control: load parameter (control) of the state, dimensionless.
-            one_sided: True for the tangent from which the next step starts. A point whose gap just closed, with a
-                stiffness of 0, then gets the stiffness of deeper contact.
-
-        Returns:
-            Derivative of the dimensionless nodal forces of each point by its m unknowns (`Rule.dofs`), shape (n, m, m).
-        """
+        """Return and store the derivative of the nodal forces by the m unknowns of each point, shape (n, m, m).
+        one_sided: True gives points whose gap just closed the stiffness of deeper contact, in place of 0."""
         self._in_tangent = self._stiffness(fields, control, one_sided)
         return self._of_unknowns(self._in_tangent)
 
     def stiffness(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the derivative of the dimensionless contact forces by the m unknowns of each point, shape (n, m, m).
-
-        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
-        """
+        """Return the derivative of the forces by the m unknowns of each point, dimensionless, shape (n, m, m)."""
         return self._of_unknowns(self._stiffness(fields, control, False))
 
     def mode_stiffness(self, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the stiffness of the points in the section and round the axis, for the second variation of modes.
 
-        Shapes: (n, m, m), symmetric, with the m unknowns of each point; (n, k, k) with its k nodes. fields: locally
-        owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
+        Shapes: (n, m, m), symmetric, with the m unknowns of each point; (n, k, k) with its k nodes.
         """
         radius = np.full(len(self.points), np.inf)
         if self._solid.scene.kinematics.axisymmetric:
@@ -250,11 +189,9 @@ class FaceContact:
         return self._of_unknowns(symmetric_stiffness(self.law, x, self.history)), self._of_unknowns(both)[:, ::2, ::2]
 
     def one_sided_change(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the one-sided stiffness of the points minus their stiffness in the last tangent.
+        """Return the one-sided stiffness of the points minus that in the last tangent, stress/length.
 
-        From the one-sided stiffness at an accepted state the next step starts: points whose gap just closed have the
-        stiffness of deeper contact. The shape is (n, components, components), stress/length. The result is 0 for points
-        at which no entry changes by more than 1e-3 of the largest entry in the last tangent.
+        Shape (n, components, components); 0 for points without a change above 1e-3 of the largest entry.
         """
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
@@ -262,20 +199,18 @@ class FaceContact:
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,
                                one_sided: bool = False) -> None:
-        """Add the derivative of the contact forces by the control, through the travel of the tool, to `values`.
+        """Add the derivative of the contact forces by the control, through the travel of the tool, to owned `values`.
 
-        values: locally owned entries of dF/dcontrol, changed in place. fields, control: locally owned unknowns and
-        load parameter of the state. one_sided: True gives points whose gap just closed the stiffness of deeper contact.
+        one_sided: True gives points whose gap just closed the stiffness of deeper contact.
         """
         if self._rate:
             stiffness = self._stiffness(fields, control, one_sided)
             self.add(values, -self._scale[:, None] * (stiffness @ (self._rate * self._travel_vector)))
 
     def _stiffness(self, fields: np.ndarray, control: float, one_sided: bool) -> np.ndarray:
-        """Return the derivative of the tractions by the positions, shape (n, components, components), stress/length.
+        """Return d(traction)/d(position), shape (n, components, components), stress/length.
 
-        one_sided: True for the tangent from which the next step starts. A point whose gap just closed, with a stiffness
-        of 0, then gets the stiffness of deeper contact.
+        one_sided: True gives points whose gap just closed the stiffness of deeper contact, in place of 0.
         """
         if one_sided:
             newly_closed = self._stored.newly_closed if self._stored else np.zeros(len(self.points), dtype=bool)
@@ -283,10 +218,7 @@ class FaceContact:
         return self.tractions(fields, control).stiffness
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
-        """Return derivatives of dimensionless nodal forces by the m unknowns of each point, shape (n, m, m).
-
-        stiffness: derivatives of the tractions by the positions, shape (n, components, components), stress/length.
-        """
+        """Return derivatives of nodal forces, shape (n, m, m), from those of tractions, stress/length."""
         return self.rule.nodal_stiffness((self._scale * self._length)[:, None, None] * stiffness)
 
     @property
@@ -322,10 +254,7 @@ class FaceContact:
         self._start_at(self.points)
 
     def activate(self, fields: np.ndarray, control: float) -> None:
-        """Set the history variables of points without earlier contact, at the state in which the contact is activated.
-
-        fields: locally owned unknowns of the state. control: load parameter (control) of the state, dimensionless.
-        """
+        """Set the history variables of points without earlier contact, at the state of activation."""
         self._start_at(self.positions(fields, control))
 
     def _start_at(self, x: np.ndarray) -> None:
@@ -334,25 +263,16 @@ class FaceContact:
         self._set_history(FaceHistory(self.law.start(x), none, ones) if self.has_history else None)
 
     def set_closures(self, closure: np.ndarray, guessed: np.ndarray | None = None) -> None:
-        """Store the predicted positions at which the gaps of the points close in the next step.
+        """Store the predicted positions of gap closures in the step, shape (n, components), length.
 
-        Args:
-            closure: positions relative to the tool, shape (n, components), length. Friction acts on a point after its
-                gap has closed there; NaN: no friction acts on the point in the step.
-            guessed: mask of the points whose contact forces are predicted too, shape (n,); None: no points.
+        At NaN no friction acts in the step. guessed: mask of points with predicted forces, shape (n,).
         """
         self._guessed = guessed
         if self._stored is not None:
             self._set_history(self._stored._replace(history=self._stored.history._replace(closure=closure)))
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the history variables to an accepted state; they do not change while the tool is inactive.
-
-        Args:
-            x: locally owned unknowns of the state.
-            control: load parameter (control) of the state, dimensionless.
-            start: not used.
-        """
+        """Update the history variables to an accepted state, owned unknowns x; they stay while the tool is inactive."""
         if self._stored is None or not self.active:
             return
         old, theta = self._stored.history, self.law.theta
@@ -390,25 +310,15 @@ class FaceContact:
         return variables.saved(self.points, self.comm)
 
     def load(self, data: dict[str, Any]) -> FaceHistory:
-        """Return the history variables of the locally owned points from the arrays of `save`.
-
-        Raises:
-            InputError: no saved point has the reference position of a point of the face.
-        """
+        """Return the history variables from the arrays of `save`; raise `InputError` if a point is missing."""
         return FaceHistory.loaded(data, self.points, self.law.start(self.points), 1e-9 * self._length)
 
     def transfer(self, source: FaceContact, variables: FaceHistory | None, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> FaceHistory | None:
-        """Return the history variables of a face of another mesh, transferred to this face.
+        """Return the history variables of the same face on another mesh (`source`), transferred to this face.
 
-        A point is in contact if the nearest point of the source is; elastic slips are fitted to slips of the source.
-
-        Args:
-            source: the same contact on the other mesh.
-            variables: history variables of `source`, or None.
-            x: locally owned unknowns of the state on this mesh.
-            control: load parameter (control) of the state, dimensionless.
-            mapping: function from reference points of the other mesh, shape (n, components), to points of this mesh.
+        A point is in contact if the nearest point of the source is; elastic slips are fitted. x: locally owned unknowns
+        on this mesh. mapping: from reference points of the other mesh, shape (n, components), to points of this one.
         """
         if variables is None:
             return None

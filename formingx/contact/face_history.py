@@ -25,14 +25,9 @@ class FaceHistory(NamedTuple):
     penalty: np.ndarray
 
     def saved(self, points: np.ndarray, comm: Any) -> dict[str, np.ndarray]:
-        """Return the history variables of all ranks, with the points to which they belong; collective.
+        """Return {name: array} of the history variables and points of all ranks; collective.
 
-        Args:
-            points: reference positions of the n locally owned points, shape (n, components), length.
-            comm: MPI communicator of the face.
-
-        Returns:
-            {name: array}, the same on all ranks: "points", the fields of `ContactHistory`, and the other fields.
+        points: reference positions of the n owned points, shape (n, components), length.
         """
         parts = comm.allgather((points, *self.history, self.newly_closed, self.penalty))
         names = ("points", *self.history._fields, "newly_closed", "penalty")
@@ -40,16 +35,9 @@ class FaceHistory(NamedTuple):
 
     @classmethod
     def loaded(cls, data: dict[str, Any], points: np.ndarray, start: ContactHistory, tolerance: float) -> FaceHistory:
-        """Return the history variables of the locally owned points from the arrays of `saved`.
+        """Return the history variables of owned points, shape (n, components), length, from the arrays of `saved`.
 
-        Args:
-            data: the arrays, such as the contents of a checkpoint.
-            points: reference positions of the n points, shape (n, components), length.
-            start: history variables of these points in the reference configuration, for the shapes of arrays.
-            tolerance: largest distance between a point and its stored position, length.
-
-        Raises:
-            InputError: no saved point has the reference position of one of the points.
+        Raise `InputError` if a point has no stored one within `tolerance`, length. `start` gives the shapes of arrays.
         """
         rows = matching_rows(points, data["points"], tolerance,
                              "checkpoint: a contact point of the scene is not in it: it belongs to another mesh")

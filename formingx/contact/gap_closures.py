@@ -64,20 +64,10 @@ double crossing(const double *x, const double *w, double theta, double shift, do
 
 
 def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
-    """Return the arc lengths at which open points on straight paths reach their tool: their gaps close.
+    """Return the arc length at which the gap of each point closes, shape (n,); `length` if open or closed before.
 
-    Contact begins at the signed distance -theta, positive inside the tool. theta is the half-width of the contact ramp.
-
-    Args:
-        law: contact law.
-        start: positions of the points relative to the tool, shape (n, c), length.
-        velocity: their derivatives by arc length, shape (n, c), length.
-        free: mask of the open points, shape (n,).
-        length: arc length of the paths.
-
-    Returns:
-        Arc length of the first gap closure of each point, shape (n,); `length` for points that stay open or were
-        closed.
+    start, velocity: positions relative to the tool and d/ds, shape (n, c), length. free: mask of the open points.
+    Contact begins at the signed distance -theta, positive inside; theta is the half-width of the contact ramp.
     """
     arc_lengths, profile = np.full(len(start), float(length)), law.profile
     if profile is not None:
@@ -100,21 +90,10 @@ def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.nda
 
 def crossing(law: Any, i: int, x: np.ndarray, velocity: np.ndarray, earliest: float, accuracy: float,
              iterations: int) -> float:
-    """Return the arc length at which the gap of a point near its tool closes, by Newton's method.
+    """Return the arc length at which the gap of point i closes (signed distance -theta), by Newton's method.
 
-    Contact begins at the signed distance -theta, positive inside the tool. theta is the half-width of the contact ramp.
-
-    Args:
-        law: contact law.
-        i: number of the point.
-        x: position of the point relative to the tool at arc length 0, shape (2,), length.
-        velocity: its derivative by arc length, shape (2,), length.
-        earliest: lower bound of the result, an arc length.
-        accuracy: largest error of the distance -theta at the result, over theta.
-        iterations: largest number of iterations.
-
-    Returns:
-        Arc length, positive or negative; the last iterate where the point does not approach its tool.
+    x, velocity: its position relative to the tool and d/ds, shape (2,), length. accuracy: error of the distance over
+    theta. The result is at least `earliest`; it is the last iterate if the point does not approach its tool.
     """
     if law.profile is not None:
         shift = law.shift[i] if isinstance(law.shift, np.ndarray) else law.shift

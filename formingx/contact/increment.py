@@ -42,15 +42,9 @@ class Increment:
         self._last_positions = b""                          # those of `_last`
 
     def tractions(self, x: np.ndarray) -> Tractions:
-        """Return the tractions at given positions: of the law, or after `linearise(x)` of the linearised law.
+        """Return the tractions at positions x, shape (n, c), length: of the law or, after `linearise(x)`, linearised.
 
         They are stored for repeated calls with the same positions.
-
-        Args:
-            x: positions of the points relative to the tool, shape (n, c), length.
-
-        Returns:
-            Tractions at the points, with their stiffness.
         """
         positions = x.tobytes()
         if self._last is None or positions != self._last_positions:
@@ -58,17 +52,9 @@ class Increment:
         return self._last[1]
 
     def linearise(self, x: np.ndarray) -> np.ndarray:
-        """Linearise the contact law for this iteration.
+        """Linearise the law at distances and slips extrapolated from the last iteration to x, shape (n, c), length.
 
-        The law is linearised at predicted distances and slips. They are extrapolated from the last iteration to x by
-        their first derivatives with respect to the position.
-
-        Args:
-            x: positions of the points relative to the tool in this iteration, shape (n, c), length.
-
-        Returns:
-            Tractions of the linearised law minus tractions of the law itself, both at x, with c components, shape (n,
-            c), stress.
+        Return the tractions of the linearised law minus those of the law itself, both at x, shape (n, c), stress.
         """
         plain = found = self.tractions(x)
         now = self._law.motion(x, self._history)
@@ -100,61 +86,29 @@ class Increment:
         return self._law.theta
 
     def last_tractions(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the tractions and stiffnesses that the last `linearise` used at some points.
-
-        Args:
-            points: indices of the points, shape (m,).
-
-        Returns:
-            Tractions, shape (m, c), stress; their derivatives by the position, shape (m, c, c), stress/length.
-        """
+        """Return the tractions, (m, c), stress, and stiffnesses, (m, c, c), that the last `linearise` used."""
         return self._last_result[1].force[points], self._last_result[1].stiffness[points]
 
     def predicted(self, motion: np.ndarray) -> Tractions:
-        """Return the linearised law of all points after a further motion.
-
-        The law is linearised at the distances and slips after the motion, as their gradients predict them.
-
-        Args:
-            motion: motion y of the points relative to the tool since the last computed tractions, shape (n, c), length.
-
-        Returns:
-            Traction f and stiffness S of this linearisation at the position before the motion. The traction after it is
-            f + S y.
-        """
+        """Return the law linearised after a further motion y of all points, shape (n, c), length.
+        Traction f and stiffness S are those before the motion: after it the traction is f + S y."""
         x, predicted = self._last_result[0], self._predicted_motion(slice(None))
         return self._law.tractions(x, self._history, None, predicted(motion))
 
     def law_at(self, points: np.ndarray) -> Callable[[np.ndarray], Tractions]:
-        """Return a function that gives the linearised law of some points after a further motion.
+        """Return `predicted` for m points: a function of their motion y, shape (m, c), length.
 
-        The law is linearised at the distances and slips after the motion, as their gradients predict them.
-
-        Args:
-            points: indices of the points, shape (m,).
-
-        Returns:
-            Function of the motion y of these points since the last computed tractions, shape (m, c), length. It returns
-            `Tractions` with the traction f at the position before the motion and the stiffness S. The traction after
-            the motion is f + S y.
+        Its `Tractions` have the traction f and stiffness S before the motion; after it the traction is f + S y.
         """
         history = self._history and ContactHistory(*(part[points] for part in self._history))
         law, x, predicted = self._law.part(points), self._last_result[0][points], self._predicted_motion(points)
         return lambda motion: law.tractions(x, history, None, predicted(motion))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Return a function that predicts how deep some points are in the ramp after a further motion.
+        """Return a function that predicts how deep m points are in the ramp after a motion, shape (m, c), length.
 
-        The local solve of contact uses this function to stop sticking points near the outer edge of the ramp.
-
-        Args:
-            points: indices of the points, shape (m,).
-
-        Returns:
-            Function of the motion of these points since the last computed tractions, shape (m, c), length. It returns
-            two arrays. The first is the depth over the width 2 theta of the ramp, shape (m,): 0 at the signed distance
-            -theta, where contact begins, and 1 at the distance theta. The second is the normal times 2 theta, shape (m,
-            c), length; 0 for points that slide, adhere or have no friction.
+        It returns the depth over the width 2 theta, shape (m,), from 0 to 1, and the normal times 2 theta, shape (m,
+        c), length; 0 for points that slide, adhere or have no friction. Sticking points stop at the edge with it.
         """
         assert self._before is not None
         width, x = 2 * self._law.theta, self._last_result[0][points]
@@ -167,22 +121,13 @@ class Increment:
         return depth_and_path
 
     def _predicted_motion(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
-        """Return a function that predicts the distances and slips of m points after a motion by their gradients.
-
-        points: indices of the points, shape (m,), or a slice. The function takes the motion of the points since the
-        last computed tractions, shape (m, c), length. It returns a `Motion` with distances, slips and their gradients.
-        """
+        """Return a function from the motion of m points, shape (m, c), length, to their predicted `Motion`."""
         assert self._before is not None
         before, x = Motion(*(part[points] for part in self._before)), self._last_result[0][points]
         return lambda motion: before.to(x + motion)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
-        """Set the sense of sliding at some points, from which the next `linearise` starts.
-
-        Args:
-            points: mask of these points, shape (n,).
-            sense: sense of sliding along the tangent of the tool, 1 or -1; 0 for sticking points, shape (n,).
-        """
+        """Set the sense of sliding, 1, -1 or 0 (sticking), at masked points, shape (n,) both, for `linearise`."""
         self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
 
     @property

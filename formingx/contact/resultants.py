@@ -15,33 +15,16 @@ from .rule import without_area
 
 
 def penetration(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Return the largest penetration depth of the contact points into the tool.
-
-    Args:
-        face: the contact.
-        fields: locally owned unknowns of the state, shape (n,).
-        control: load parameter (control) of the state, dimensionless.
-
-    Returns:
-        Depth, length; 0 if no point is inside the tool.
-    """
+    """Return the largest penetration depth of the contact points into the tool, length; 0 if none is inside."""
     d = face.contact.tool.signed_distance(face.positions(fields, control))
     return float(combined(face.comm, max(float(d.max(initial=0.0)), 0.0), MPI.MAX))
 
 
 def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Return the reference length of the part of the face that is in contact; in three dimensions its reference area.
+    """Return the reference length of the face in contact; in three dimensions its area, length^2.
 
-    In an axisymmetric body the node on the axis carries hardly any force. It may have a small gap where its neighbours
-    stick. It counts as in contact if the next contact point does.
-
-    Args:
-        face: the contact.
-        fields: locally owned unknowns of the state, shape (n,).
-        control: load parameter (control) of the state, dimensionless.
-
-    Returns:
-        Length; in three dimensions area, length^2.
+    The node on the axis carries hardly any force and may have a small gap: it counts as in contact if the next point
+    does. fields: owned unknowns, shape (n,).
     """
     rule = face.rule
     rows = gathered(face.comm, np.column_stack([rule.points, rule.lumped, rule.extent, face.touching(fields, control)]))
@@ -52,81 +35,33 @@ def length(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 
 def area(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Return the deformed contact area of a sheet in three dimensions.
-
-    Args:
-        face: the contact.
-        fields: locally owned unknowns of the state, shape (n,).
-        control: load parameter (control) of the state, dimensionless.
-
-    Returns:
-        Deformed area of the part of the face that is in contact, length^2.
-    """
+    """Return the deformed contact area of a sheet in three dimensions, length^2."""
     return _sum(face, face.rule.lumped * face.rule.area_ratio(fields) * face.touching(fields, control))
 
 
 def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
-    """Return the resultant contact force of the body on the tool.
-
-    In axisymmetric problems the r entry is the radial traction integrated over the circumference. It is no resultant:
-    the resultant radial force is 0.
-
-    Args:
-        face: the contact.
-        fields: locally owned unknowns of the state, shape (n,).
-        control: load parameter (control) of the state, dimensionless.
-
-    Returns:
-        Force, shape (components,), stress length^2; in plane strain per depth, stress length.
-    """
+    """Return the contact force of the body on the tool, shape (components,), stress length^2 (per depth stress length).
+    The axisymmetric r entry is the radial traction over the circumference, no resultant."""
     total = (face.area[:, None] * face.tractions(fields, control).force).sum(0) - face.unbalanced
     return np.asarray(combined(face.comm, total, MPI.SUM))
 
 
 def normal_force(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Return the sum of the normal contact forces at all points, as a scalar.
-
-    Args:
-        face: the contact.
-        fields: locally owned unknowns of the state, shape (n,).
-        control: load parameter (control) of the state, dimensionless.
-
-    Returns:
-        Sum of the normal forces, stress length^2; in plane strain per depth, stress length.
-    """
+    """Return the sum of the normal contact forces, stress length^2; in plane strain per depth."""
     return _sum(face, face.area * face.tractions(fields, control).normal)
 
 
 def energy(face: FaceContact, fields: np.ndarray, control: float) -> float:
-    """Return the energy stored by the penalty of the contact, the integral of the normal tractions over the distance.
-
-    Args:
-        face: the contact.
-        fields: locally owned unknowns of the state, shape (n,).
-        control: load parameter (control) of the state, dimensionless.
-
-    Returns:
-        Energy, stress length^3; in plane strain per depth, stress length^2.
-    """
+    """Return the energy stored by the penalty of the contact, stress length^3; in plane strain per depth."""
     return _sum(face, face.rule.area * face.law.energy(face.positions(fields, control), face.history))
 
 
 def traction(face: FaceContact, fields: np.ndarray, control: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return the contact tractions at all points of the face, sorted by the reference coordinate R.
+    """Return reference positions, shape (m, components), and tractions, shape (m, 2), normal and tangential, stress.
 
-    A traction is the force at a point divided by its tributary reference area (`Rule.lumped`). Tractions times areas
-    add up to the contact force. The node on the axis has no tributary area. Its force is added to the middle node
-    of its facet. It gets the pressure of that node and no tangential traction: the pressure is even in R, the
-    tangential traction odd.
-
-    Args:
-        face: the contact.
-        fields: locally owned unknowns of the state, shape (n,).
-        control: load parameter (control) of the state, dimensionless.
-
-    Returns:
-        Reference positions of the m points of all ranks, shape (m, components), length. Normal and tangential traction
-        per reference area, shape (m, 2), stress.
+    They are sorted by R, over all ranks: forces divided by tributary reference areas (`Rule.lumped`). The node on the
+    axis has none. Its force is added to the middle node of its facet, whose pressure it gets: the pressure is even in
+    R, the tangential traction odd.
     """
     found, rule, c = face.tractions(fields, control), face.rule, face.points.shape[1]
     rows = np.column_stack([rule.points, rule.area, rule.lumped, rule.lengths, found.normal, found.tangential])

@@ -157,16 +157,9 @@ class Lobatto(_NodalPoints):
         self._facets = _own_facets(solid.scene.mesh, on)
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Return the ratio of deformed to reference area at each node; collective.
+        """Return the ratio of deformed to reference area at each node, shape (n,); collective.
 
-        It is the mean over the edges on both sides of the node. On the axis the circumferential stretch equals the
-        stretch along the edge.
-
-        Args:
-            fields: locally owned unknowns of the state.
-
-        Returns:
-            Area ratio, shape (n,).
+        It is the mean over the edges on both sides. On the axis the hoop stretch equals that along the edge.
         """
         now = gathered(self._comm, self.points + self._length * self.displacement(fields))
         rest, edges = gathered(self._comm, self.points), self.edges
@@ -254,12 +247,6 @@ class Vertices(_NodalPoints):
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
         """Return the deformed area of the triangles around each node over their reference area, shape (n,); collective.
-
-        Args:
-            fields: locally owned unknowns of the state.
-
-        Returns:
-            Area ratio, shape (n,).
         """
         w = self.surface.w.x
         before = w.array.copy()
@@ -329,10 +316,7 @@ class Gauss:
         return blocks.reshape(len(blocks), *[3 * stiffness.shape[-1]] * 2)
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate values at the three nodes of the facet of each point, shape (n, 3), to the points, shape (n,).
-
-        A uniform field stays uniform to the last bit.
-        """
+        """Interpolate values at the nodes of each facet, shape (n, 3), to shape (n,); uniform ones stay exact."""
         return values[:, 0] + np.einsum("na,na->n", self.shapes[:, 1:], values[:, 1:] - values[:, :1])
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
@@ -366,15 +350,7 @@ def _along(edges: np.ndarray) -> np.ndarray:
 
 
 def without_area(lumped: np.ndarray, lengths: np.ndarray) -> np.ndarray:
-    """Return a mask of the nodes of a face that lie on the axis and therefore have no tributary area.
-
-    Args:
-        lumped: tributary areas of the points, shape (n,), length^2.
-        lengths: their tributary lengths, shape (n,), length; 0 for points outside the face.
-
-    Returns:
-        Mask, shape (n,).
-    """
+    """Return a mask of the nodes on the axis, shape (n,), from areas, length^2, and tributary lengths."""
     return (lumped < 1e-9 * lumped.max()) & (lengths > 0)
 
 
@@ -385,10 +361,9 @@ def _displacements(solid: Any) -> tuple[Any, np.ndarray]:
 
 
 def _nodes_of(facets: np.ndarray, vectors: Any, X: np.ndarray) -> np.ndarray:
-    """Return the local numbers of the two end nodes and the middle node of each facet, shape (facets, 3).
+    """Return the local numbers of both ends and the middle node of each facet, shape (facets, 3).
 
-    facets: local numbers, shape (facets,). vectors: space of the displacement. X: reference positions of all its nodes,
-    shape (nodes, components), length.
+    X: reference positions of the nodes, shape (nodes, components), length.
     """
     found = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
              for f in facets]

@@ -127,11 +127,7 @@ class StepLimit:
 
     @property
     def only_sticks(self) -> bool:
-        """True if there is active contact with friction, all of it sticks, and its tools are profiles in a plane.
-
-        No point slides then, so the path does not end where points begin to slide. The run may therefore reduce failed
-        steps further before it tries a snap-through (`SnapThrough.lengths_for`).
-        """
+        """True if active contact with friction all sticks, on profiles in a plane: no point begins to slide."""
         faces = [approach.face for approach in self.active_contacts if approach.face.law.has_friction]
         return bool(faces) and all(face.contact.sticks and not face.contact.lagged for face in faces)
 
@@ -145,29 +141,14 @@ class StepLimit:
         self.several_closures = False
 
     def predict(self, curve: Any, state: Any) -> EventPrediction | None:
-        """Return the predicted contact events after an accepted state.
-
-        Args:
-            curve: path solver (`solve.arc_length.Curve`), for the tangent at the state.
-            state: the accepted state.
-
-        Returns:
-            The prediction; None if no events are predicted.
-        """
+        """Return the predicted contact events after an accepted state; None if none are predicted."""
         return self._predictor.predict(curve, state) if self._predictor else None
 
     def length(self, trial: TrialStep) -> float:
-        """Return the largest admissible arc length of a step along a tangent.
+        """Return the largest admissible arc length, at most `trial.length`, of a step along a tangent.
 
-        The step ends where the gaps of a number of points have closed. This number is `Approach.max_closures`, often
-        one, or up to a twentieth of the points of a face if the order of the gap closures is predicted. If at most one
-        point is in contact, the step ends at the first gap closure.
-
-        Args:
-            trial: the trial step, with the wanted arc length.
-
-        Returns:
-            Arc length, dimensionless, at most `trial.length`.
+        It ends where the gaps of `Approach.max_closures` points have closed (up to a twentieth of a face if the order
+        is predicted), or at the first gap closure if at most one point is in contact.
         """
         found = trial.events.step_length(trial.length) if trial.events else None
         if found is not None:
@@ -177,16 +158,10 @@ class StepLimit:
                     for c in self.active_contacts], default=trial.length)
 
     def prepare(self, trial: TrialStep, ends: bool = False) -> tuple[np.ndarray, float] | None:
-        """Prepare all active contacts for the solve of a step: store the predicted positions of gap closures.
+        """Store the predicted positions of gap closures in all active contacts; return the deviation from the tangent.
 
-        Args:
-            trial: the trial step.
-            ends: True if `check` may shorten the step to one of its gap closures. Only then may a sticking point, whose
-                gap closes near the end of the step, carry no friction in this step.
-
-        Returns:
-            Deviation of the predicted end of the step from the tangent, due to contact events: change of x, locally
-            owned entries, shape (n,), and of the control. None if it is zero.
+        It is (change of x, shape (n,); of the control), or None if zero. ends: True if `check` may shorten the step to
+        a gap closure; only then may a late sticking closure carry no friction in it.
         """
         n, found = self._n, trial.events.closures(trial.length) if trial.events else None
         for k, approach in enumerate(self.active_contacts):
@@ -198,19 +173,8 @@ class StepLimit:
         return trial.events.bend(trial.length) if trial.events and found else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> StepRejection | None:
-        """Check after the solve whether a step was too long for the contacts.
-
-        Args:
-            old: accepted state at the start of the step.
-            new: converged state at its end.
-            length: arc length of the step.
-            ends: True to also reject a step after whose gap closure a point slips wrongly. A sticking point then slips
-                too far without friction, or a sliding point slides against its slip since the closure. The repeated
-                step ends at this gap closure.
-
-        Returns:
-            Reason and admissible fraction of the step; None if the step is accepted.
-        """
+        """Return reason and admissible fraction of a solved step that was too long for the contacts, or None.
+        `ends`: see `Approach.rejection`."""
         found = [c.rejection(old, new, self._n, length, ends) for c in self.active_contacts]
         return min(filter(None, found), key=lambda rejection: rejection.fraction, default=None)
 
@@ -230,15 +194,6 @@ class StepLimit:
         return found[0][1]([c for c, _ in found], self._n) if found else None
 
     def passes_through(self, old: Any, new: Any) -> bool:
-        """Return True if a contact point passes through its tool between two states.
-
-        Args:
-            old: state at the start of the step.
-            new: state at its end.
-
-        Returns:
-            True if the depth on the straight path of a point exceeds the larger depth of its ends by more than
-            `StepLimits.max_cut_ratio` times the tributary length of the point.
-        """
+        """Return True if a contact point passes through its tool between two states (`Approach.cuts_tool`)."""
         n = self._n
         return any([c.passes_through(old.x[:n], old.control, new.x[:n], new.control) for c in self.active_contacts])

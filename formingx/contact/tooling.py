@@ -35,23 +35,15 @@ class Tooling(NamedTuple):
 
     @classmethod
     def of_description(cls, scene: dict[str, Any]) -> Tooling:
-        """Return the tooling of a scene that is given as plain data.
-
-        Args:
-            scene: plain data of the scene, with lists of "contacts", "loads" and "supports", and the entry "mesh".
-
-        Returns:
-            The tooling.
-        """
+        """Return the tooling of a scene that is given as plain data."""
         return cls([_contact(dict(data)) for data in scene["contacts"]], len(scene["loads"]) + len(scene["supports"]),
                    scene["mesh"]["length"])
 
     @property
     def names(self) -> list[str]:
-        """Name of the tool of each contact, in the order of the contacts.
+        """Name of the tool of each contact, in order; one without a name is "tool 1", by its contact's number.
 
-        A tool without a name is called "tool 1", "tool 2", ..., by the number of its contact. Unnamed tools with the
-        same direction of motion count as one tool: they all have the name of the first of them.
+        Unnamed tools with the same direction count as one, with the name of the first.
         """
         first: dict[Any, int] = {}
         alike = [k if c.direction is None else c.direction for k, c in enumerate(self.contacts)]
@@ -59,10 +51,7 @@ class Tooling(NamedTuple):
 
     @property
     def force_columns(self) -> dict[str, str]:
-        """Column name of the contact force on each tool, {tool name: column}.
-
-        The force on the only tool is in "tool_force". Of several tools, the force on "plug" is in "plug_force", and
-        the force on "tool 1", which has no name, in "tool_1_force".
+        """{tool name: column of its contact force}: "tool_force" for the only tool, else "plug_force", "tool_1_force".
         """
         names = self.names
         if len(set(names)) == 1:
@@ -70,14 +59,9 @@ class Tooling(NamedTuple):
         return {name: f"{c.name or name.replace(' ', '_')}_force" for name, c in zip(names, self.contacts)}
 
     def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
-        """Return the travel of each tool in a state.
+        """Return the travel of each tool along its direction, length; None for an inactive tool.
 
-        Args:
-            setting: step data of the state, as plain data of a `StepData`; empty for the reference configuration.
-            control: load parameter (control) of the state, dimensionless.
-
-        Returns:
-            Travel of each tool along its direction of motion, length; None for an inactive tool.
+        setting: `StepData` as plain data; empty for the reference configuration.
         """
         if not setting:
             return [0.0] * len(self.contacts)
@@ -86,14 +70,7 @@ class Tooling(NamedTuple):
                 for i in range(self.first, self.first + len(self.contacts))]
 
     def placed(self, travels: list[float | None]) -> list[tuple[Tool, np.ndarray]]:
-        """Return the active tools with their displacements.
-
-        Args:
-            travels: travel of each tool, length; None for an inactive tool.
-
-        Returns:
-            For each active tool the tool and its displacement (r, z), shape (2,), length.
-        """
+        """Return each active tool with its displacement (r, z), shape (2,), length; travels: None if inactive."""
         return [(contact.tool, travel * contact.travel_vector)
                 for contact, travel in zip(self.contacts, travels, strict=True) if travel is not None]
 
@@ -102,26 +79,14 @@ _three_dimensional: list[Callable[[dict[str, Any]], Any]] = []
 
 
 def register_tools(make: Callable[[dict[str, Any]], Any]) -> None:
-    """Register the function that makes tools in three dimensions; the extension 'space' calls this function.
-
-    Args:
-        make: function that maps the plain data of a tool to the tool.
-    """
+    """Register the function that makes a tool in three dimensions from plain data, for the extension 'space'."""
     _three_dimensional[:] = [make]
 
 
 def tool_of(shape: dict[str, Any]) -> Any:
-    """Return the tool that is described by plain data.
+    """Return the tool that plain data describe; in a section they have the entries "pieces" and "closed".
 
-    Args:
-        shape: plain data of the tool. A tool in a section has the entries "pieces", lists of the values of a `Line` or
-            an `Arc`, and "closed". A tool in three dimensions has other entries.
-
-    Returns:
-        The tool.
-
-    Raises:
-        InputError: the tool is three-dimensional, and `formingx.extensions.space` is not installed.
+    Raise `InputError` for a tool in three dimensions without `formingx.extensions.space`.
     """
     if "pieces" in shape:
         pieces: list[Line | Arc] = []
