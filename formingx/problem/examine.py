@@ -57,8 +57,7 @@ class Examination:
     def _find_worst(self, elements: Body) -> None:
         """Store the smallest J, the worst shape of an element, and the largest use of a material's stretch limit.
 
-        The use is (I1 - 3) / (limit of I1 - 3), with tr F^T F as I1. elements: the elements in the last good state.
-        The values are stored in `facts` under the names of the fields of a `Diagnosis`.
+        The use is (I1 - 3) / (limit of I1 - 3), with tr F^T F as I1. `facts` gets them under names of `Diagnosis`.
         """
         problem, facts = self._problem, self.facts
         facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, elements)
@@ -111,14 +110,9 @@ class Examination:
         facts["flipped"] = _status_changes(problem, attempt)
 
     def draw(self, file: Any, title: str) -> None:
-        """Draw the deformed last good state with J, the worst points and the tools; rank 0 draws.
+        """Draw the deformed last good state with J, the worst points and the tools to a file; rank 0 draws.
 
-        Args:
-            file: name of the picture; its folder is created.
-            title: title of the picture.
-
-        Raises:
-            InputError: the body is a membrane, which has no elements to draw, or there is no good state.
+        Raise `InputError` for a membrane, which has no elements to draw, or without a good state.
         """
         if self._elements is None:
             raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"

@@ -173,42 +173,23 @@ class Problem:
 
     @property
     def temperature(self) -> Temperature | None:
-        """Temperature of the body at the last accepted state; None if the scene has no temperature.
-
-        Inside `state_context` it is the temperature at the state of the context.
-        """
+        """Temperature of the body at the last accepted state, or of `state_context`; None without one."""
         return self.forms.temperature
 
     def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
-        """Set the fields and the control of the forms.
-
-        Args:
-            x: unknowns, locally owned entries, shape (n,).
-            control: load parameter (control), dimensionless.
-        """
+        """Set the fields and the control of the forms; x: locally owned entries, shape (n,)."""
         self._control[()] = control
         self.set_fields(x)
 
     def set_fields(self, x: np.ndarray) -> None:
-        """Set the fields of the forms, and update the coefficients that depend on them.
-
-        Args:
-            x: unknowns, locally owned entries, shape (n,).
-        """
+        """Set the fields of the forms from x, shape (n,), and update the coefficients that depend on them."""
         self._fields[: self._n] = x[: self._n]
         if self.comm.size > 1:
             self.forms.w.x.scatter_forward()
         self.forms.refresh()
 
     def motion(self, control: float) -> np.ndarray:
-        """Return a vector of unknowns with the prescribed values of the constrained ones, and 0 elsewhere.
-
-        Args:
-            control: dimensionless control, on which prescribed displacements depend.
-
-        Returns:
-            Locally owned entries, shape (n,).
-        """
+        """Return the prescribed values at the constrained unknowns, and 0 elsewhere; shape (n,), dimensionless."""
         values = np.zeros(self.x.getLocalSize())
         values[self.constrained] = self._stage.base + self._stage.rate * control
         return values
@@ -216,13 +197,7 @@ class Problem:
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
         """Set the fields and the control of the forms from a vector of unknowns.
 
-        Args:
-            x: unknowns.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            Lagrange multipliers of the constrained mean displacements of boundaries (`ConstrainedMean`), shape
-            (means,), the same on all ranks.
+        Return the Lagrange multipliers of the means of boundaries (`ConstrainedMean`), shape (means,), on all ranks.
         """
         values, last = x.array_r, self.comm.size - 1
         self.set_fields_and_control(values, control)
@@ -236,18 +211,11 @@ class Problem:
         return multipliers
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        r"""Return the inner product of two dimensionless displacement fields, by a lumped mass matrix.
+        r"""Return the inner product of two displacement fields over L, by a lumped mass matrix; dimensionless.
 
         .. math:: \frac{1}{V} \int_V a \cdot b \, dV
 
         V is the reference volume. Pressures and multipliers do not count.
-
-        Args:
-            a: first vector of unknowns, whose displacements are divided by the length scale L.
-            b: second vector of unknowns.
-
-        Returns:
-            Inner product (dimensionless).
         """
         return self._dot(self._metric * a.array_r[: self._n], b.array_r[: self._n])
 
@@ -259,35 +227,15 @@ class Problem:
         self.fill(out, self.forms.w.x.array[: self._n])
 
     def assemble(self, form: Any) -> np.ndarray:
-        """Assemble a compiled linear form at the current fields and control of the forms.
-
-        Args:
-            form: compiled linear form.
-
-        Returns:
-            Locally owned entries, shape (n,).
-        """
+        """Assemble a compiled linear form at the current fields and control; owned entries, shape (n,)."""
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def assemble_scalar(self, form: Any) -> float:
-        """Assemble a compiled scalar form at the current fields and control of the forms, over all ranks.
-
-        Args:
-            form: compiled form without arguments.
-
-        Returns:
-            Value of the form.
-        """
+        """Assemble a compiled scalar form at the current fields and control, over all ranks."""
         return float(combined(self.comm, fem.assemble_scalar(form), MPI.SUM))
 
     def fill(self, out: PETSc.Vec, values: np.ndarray, tail: list[float] | None = None) -> None:
-        """Set a vector from locally owned field values and multipliers.
-
-        Args:
-            out: vector that receives the values.
-            values: values of the fields, shape (n,).
-            tail: values of the multipliers, used on the last rank; None: 0.
-        """
+        """Set a vector from owned field values, shape (n,), and multipliers of the last rank; None: 0."""
         array = out.array_w
         array[: self._n] = values
         array[self._n:] = 0.0 if tail is None or self.comm.rank < self.comm.size - 1 else tail
@@ -312,66 +260,34 @@ class Problem:
             out.array_w += (control - 1) * stage.unbalanced
 
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
-        """Return the force of the body on a driven support, positive along the displacement component; collective.
+        """Return the force of the body on driven support `number`, positive along its component; collective.
 
-        The force is the sum of external minus internal forces at the driven unknowns of all ranks.
-
-        Args:
-            number: number of the support in `Scene.items`.
-            x: unknowns.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            Force, stress times length^2; per unit depth in plane strain, stress times length.
+        The unit is stress length^2; in plane strain per unit depth, stress length.
         """
         left = self.forces(x, control)[self.driven_unknowns(number)].sum()
         forms = self.forms
         return -float(combined(self.comm, left, MPI.SUM)) * forms.stress * forms.volume / forms.length
 
     def driven_unknowns(self, number: int) -> np.ndarray:
-        """Return the unknowns whose values a driven support prescribes.
-
-        Args:
-            number: number of the support in `Scene.items`.
-
-        Returns:
-            Local numbers of the locally owned unknowns, ascending, shape (n,).
-        """
+        """Return the local numbers of owned unknowns that a driven support prescribes, ascending, shape (n,)."""
         return self._constraints.driven_by(number)
 
     def forces(self, x: PETSc.Vec, control: float) -> np.ndarray:
-        """Return the internal minus the external forces, contact included, without the constraints of supports.
-
-        Args:
-            x: unknowns.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            Dimensionless forces, locally owned field unknowns, shape (n,).
+        """Return the internal minus external forces, contact included, without constraints; dimensionless, shape (n,).
         """
         self.set_state(x, control)
         return self._forces(x.array_r[: self._n], control)
 
     def body_forces(self, x: np.ndarray, control: float) -> np.ndarray:
-        """Return the internal minus the external forces without contact forces and constraints.
-
-        In equilibrium these are the forces that supports and tools must supply.
-
-        Args:
-            x: unknowns, locally owned entries, shape (n,).
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            Dimensionless forces, locally owned field unknowns, shape (n,).
-        """
+        """Return the internal minus external forces without contact and constraints; dimensionless, shape (n,).
+        In equilibrium supports and tools supply them."""
         self.set_fields_and_control(x, control)
         return self.assemble(self._residual)
 
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the internal minus the external forces, contact included, at the state to which the forms are set.
+        """Return the internal minus external forces, contact included, at the state to which the forms are set.
 
-        fields: the locally owned field unknowns of this state, shape (n,). control: its load parameter (control). The
-        forces are dimensionless, for the same unknowns, shape (n,).
+        fields: its locally owned field unknowns, shape (n,). The forces are dimensionless, shape (n,).
         """
         values = self.assemble(self._residual)
         for contact in self.active_contacts:
@@ -379,51 +295,23 @@ class Problem:
         return values
 
     def has_inverted_element(self, x: PETSc.Vec, control: float) -> bool:
-        """Return True if an element of the body is inverted in a state, or if a point lies beyond the axis; collective.
-
-        Args:
-            x: unknowns.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            True if a hoop stretch or an in-plane determinant of the deformation gradient is not positive.
-        """
+        """Return True if a hoop stretch or in-plane determinant of F is not positive on any rank; collective."""
         self.set_state(x, control)
         return not self.admissible.holds()
 
     def extreme_volume_ratio(self, state: Any) -> WorstValue | None:
-        """Return the volume ratio J with the largest |ln J| in a state; collective.
-
-        Args:
-            state: a `State` of the path.
-
-        Returns:
-            The volume ratio with its reference position; None for a membrane.
-        """
+        """Return the volume ratio J with the largest |ln J| and its position; None for a membrane; collective."""
         with self.state_context(state):
             return self.admissible.extreme_volume_ratio()
 
     def volume_error_away(self, state: Any, places: np.ndarray, distance: float) -> float:
-        """Return the root mean square of the volume change J - 1 over elements far from given positions; collective.
-
-        Args:
-            state: a `State` of the path.
-            places: reference positions, shape (k, 2), length.
-            distance: elements with a quadrature point nearer to one of the positions are left out, length.
-
-        Returns:
-            Volume-weighted root mean square (dimensionless).
-        """
+        """Return the volume-weighted root mean square of J - 1 away from places, shape (k, 2), length; collective.
+        Elements with a quadrature point within `distance` are left out."""
         with self.state_context(state):
             return self.admissible.volume_error_away(places, distance)
 
     def inverted_elements(self) -> tuple[int, int, tuple[float, float]]:
-        """Count the inverted elements for the current fields of the forms; collective.
-
-        Returns:
-            Number of elements with a point at which the volume ratio J is not positive, number of all elements,
-            reference position (R, Z) of the smallest J.
-        """
+        """Return the numbers of inverted and of all elements, and (R, Z) of the smallest J; collective."""
         return self.admissible.inverted_elements()
 
     def begin(self, old: Any = None) -> None:
@@ -530,18 +418,10 @@ class Problem:
         self._predicted = None, []
 
     def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
-        """Update the history variables of materials and temperature to the end of a step that is not yet accepted.
+        """Return the history variables of materials and temperature at the end of a step that is not yet accepted.
 
-        The result is stored, and `advance` uses it if it accepts the same x. The caller must restore the earlier
-        history variables.
-
-        Args:
-            start: state at the beginning of the step.
-            x: unknowns at the end of the step, locally owned entries, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            History variables of materials and temperature at the end of the step.
+        They are stored, and `advance` uses them if it accepts the same x, shape (n,). The caller must restore the
+        earlier ones.
         """
         self.set_fields_and_control(x, control)
         for history in self.forms.histories:
@@ -554,14 +434,8 @@ class Problem:
     def state_context(self, state: Any) -> Iterator[Self]:
         """Set the problem to a state inside the context, and restore the previous values at its end.
 
-        Step data, history variables, unknowns (`x`, `forms.w`) and control are set.
-
-        Args:
-            state: object with x (locally owned entries), control, time, setting (`StepData` as plain data, or empty)
-                and history_variables.
-
-        Yields:
-            The problem.
+        Step data, history variables, unknowns (`x`, `forms.w`) and control are set. The state has x (locally owned
+        entries), control, time, setting (`StepData` as plain data, or empty) and history_variables.
         """
         fields, control, clock = self._fields.copy(), self.control, self.forms.clock
         stage, variables, x, predicted = self._stage, self.history_variables, self.x.array_r.copy(), self._predicted
@@ -580,9 +454,7 @@ class Problem:
     def restore(self, state: Any) -> None:
         """Restore step data, history variables and process time of an accepted state, to start a step from it.
 
-        Args:
-            state: object with x (locally owned entries), control, time, setting (`StepData` as plain data, or empty)
-                and history_variables.
+        `state` has the attributes of `state_context`.
         """
         if self.has_history:
             self.history_variables = state.history_variables
@@ -593,11 +465,8 @@ class Problem:
 
     @property
     def fading_forces(self) -> np.ndarray | None:
-        """Forces f that a change of loads, supports or contacts left out of balance, for the locally owned fields.
-
-        They fade as the control goes from 0 to 1: at a control, (1 - control) f is subtracted from the residual. Shape
-        (n,), dimensionless; None if the step data have no fading.
-        """
+        """Unbalanced forces f of changed items, shape (n,), dimensionless, or None.
+        The residual loses (1 - control) f."""
         return None if self._stage.unbalanced is None else self._stage.unbalanced[: self._n]
 
     def enter(self, setting: StepData, x: np.ndarray, control: float) -> None:
@@ -645,23 +514,13 @@ class Problem:
                                      f" {depth:.6g} into the tool")
 
     def followed(self, points: np.ndarray) -> np.ndarray:
-        """Return the positions on this mesh of material points that are given on the first mesh of a run.
-
-        Args:
-            points: reference positions on the first mesh, shape (n, 2), length.
-
-        Returns:
-            Reference positions on this mesh, shape (n, 2), length.
-        """
+        """Return the positions on this mesh of material points on the first mesh of a run, shape (n, 2), length."""
         state_transfer = self.scene.state_transfer
         return points if state_transfer is None else state_transfer.followed(self, points)
 
     def update_temperature(self) -> None:
-        """Update material constants and coefficients of friction to a changed temperature; collective.
-
-        Raises:
-            InputError: a constant or friction has no value at a temperature.
-        """
+        """Update material constants and friction to a changed temperature; collective.
+        Raise `InputError` if one has no value there."""
         call_on_all_ranks(self.comm, [self.forms.update_temperature,
                                       *(contact.update_temperature for contact in self.contacts)])
 
