@@ -82,10 +82,9 @@ class Admissible:
             self._gradients = gradients.reshape(n, -1, shapes.shape[2])            # (cells, points x 2, dofs)
 
     def minimum(self) -> WorstValue:
-        """Return the smallest of all hoop stretches and in-plane determinants for the current field; collective.
+        """Return the smallest hoop stretch or in-plane determinant, or the first that is not finite; collective.
 
-        Returns:
-            The smallest value with its reference position; the first value that is not finite, if there is one.
+        It belongs to the current field, with its reference position.
         """
         found = [WorstValue("in-plane determinant", np.inf, (0.0, 0.0))]
         for quantity, values in self.quantities().items():
@@ -96,11 +95,7 @@ class Admissible:
         return min(parts, key=lambda part: part.value if np.isfinite(part.value) or part.value > 0 else -np.inf)
 
     def extreme_volume_ratio(self) -> WorstValue | None:
-        """Return the volume ratio J with the largest |ln J| for the current field; collective.
-
-        Returns:
-            The volume ratio with its reference position; None for a membrane.
-        """
+        """Return the volume ratio J with the largest |ln J| and its position; None for a membrane; collective."""
         if not self._solid:
             return None
         found = WorstValue("volume ratio", 1.0, (0.0, 0.0))
@@ -111,14 +106,9 @@ class Admissible:
         return max(listed(self._forms.comm, found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
 
     def volume_error_away(self, places: np.ndarray, distance: float) -> float:
-        """Return the root mean square of the volume change J - 1 over elements far from given positions; collective.
+        """Return the volume-weighted root mean square of J - 1 away from places, shape (k, 2), length; collective.
 
-        Args:
-            places: reference positions, shape (k, 2), length.
-            distance: elements with a quadrature point nearer to one of the positions are left out, length.
-
-        Returns:
-            Volume-weighted root mean square for the current field (dimensionless); 0 if no element is left.
+        Elements with a quadrature point within `distance` are left out; 0 if none is left.
         """
         X, n = self._X[:, : self._n], self._n
         J = np.prod(list(self.quantities().values()), axis=0)[:, :n]
@@ -129,24 +119,16 @@ class Admissible:
         return float(np.sqrt(squares / total)) if total else 0.0
 
     def volume_ratios(self) -> tuple[float, float]:
-        """Return the extreme volume ratios at the quadrature points of the energy; collective.
-
-        Returns:
-            Smallest and largest volume ratio J for the current field (dimensionless).
-        """
+        """Return the smallest and largest volume ratio J at the quadrature points of the energy; collective."""
         J = np.prod(list(self.quantities().values()), axis=0)[:, :self._n]
         found = listed(self._forms.comm, (J.min(initial=np.inf), J.max(initial=-np.inf)))
         return float(min(low for low, _ in found)), float(max(high for _, high in found))
 
     def holds(self) -> bool:
-        """Check that no point has crossed the axis and that no element is inverted; collective.
+        """Return True if no point has crossed the axis and no element is inverted, for the current field; collective.
 
-        In-plane determinants are checked at the quadrature points of the energy only. Between them a sharp edge may
-        invert a strongly bent element without harm to the solution, as in a coarse mesh under a plug. `minimum` finds
-        such points.
-
-        Returns:
-            True if all checked hoop stretches and determinants of the current field are positive on all ranks.
+        In-plane determinants are checked at quadrature points of the energy only. Between them a sharp edge may invert
+        a bent element without harm, as under a plug. `minimum` finds such points.
         """
         found = self.quantities()
         mine = all(bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
@@ -154,12 +136,7 @@ class Admissible:
         return all(listed(self._forms.comm, mine))
 
     def inverted_elements(self) -> tuple[int, int, tuple[float, float]]:
-        """Count the inverted elements of a solid for the current field; collective.
-
-        Returns:
-            Number of elements with a point at which the volume ratio J is not positive, number of all elements,
-            reference position (R, Z) of the smallest J.
-        """
+        """Return the numbers of inverted and of all elements of a solid, and (R, Z) of the smallest J; collective."""
         J = np.prod(list(self.quantities().values()), axis=0)
         mine = (np.inf, (0.0, 0.0))
         if J.size:
@@ -169,11 +146,9 @@ class Admissible:
         return sum(c[0] for c in counts), sum(c[1] for c in counts), min(c[2] for c in counts)[1]
 
     def quantities(self) -> dict[str, np.ndarray]:
-        """Return hoop stretches and in-plane determinants at the checked points of the locally owned cells.
+        """Return {"in-plane determinant": values, "hoop stretch": values} in owned cells, shape (cells, points) each.
 
-        Returns:
-            {"in-plane determinant": values, "hoop stretch": values}, shape (cells, points) each. A membrane has no
-            determinant, plane strain no hoop stretch.
+        A membrane has no determinant, plane strain no hoop stretch.
         """
         w, size = self._forms.w.x.array, self._forms.length
         if np.array_equal(w, self._known[0]):               # checks of a state follow each other

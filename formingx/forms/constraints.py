@@ -89,26 +89,14 @@ class Constraints:
         return any(entry.driven for entry in self.entries)
 
     def driven_by(self, item: int) -> np.ndarray:
-        """Return the unknowns that a support with a prescribed displacement moves.
-
-        Args:
-            item: number of the support in `Scene.items`.
-
-        Returns:
-            Local numbers of the locally owned unknowns, ascending, shape (n,).
-        """
+        """Return the local numbers of owned unknowns that support `item` moves, ascending, shape (n,)."""
         dofs = np.unique(np.concatenate([e.dofs for e in self.entries if e.item == item and e.driven]))
         return dofs[dofs < self._n]
 
     def active(self, inactive: set[int]) -> Active:
-        """Return the constraints that are active while some supports are inactive.
+        """Return the constraints that are active while the items `inactive` of `Scene.items` are not.
 
-        Args:
-            inactive: numbers of the inactive supports, loads and contacts in `Scene.items`.
-
-        Returns:
-            The constraints of all other supports. If one support fixes an unknown and another one moves it, the unknown
-            follows the moving support.
+        If one support fixes an unknown and another one moves it, the unknown follows the moving support.
         """
         entries = [entry for entry in self.entries if entry.item not in inactive]
         numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(e.dofs for e in entries)])
@@ -126,10 +114,7 @@ class Constraints:
     def _dofs_of(self, support: Any, sub: Any, item: Constrained) -> np.ndarray:
         """Return the local numbers of the unknowns that a constraint prescribes, with ghosts, shape (n,).
 
-        support: the `Support`, for the message. sub: subspace of the displacement component. item: the constraint.
-
-        Raises:
-            InputError: the mesh has no node at the given point.
+        sub: subspace of the displacement component. Raise `InputError` if the mesh has no node at the point.
         """
         forms = self._forms
         if item.on is not None:

@@ -41,14 +41,7 @@ class ControlledLoads(BodyModel):
         raise NotImplementedError
 
     def constant(self, value: float) -> fem.Constant:
-        """Return a UFL constant; a new value needs no new compilation of the forms that contain it.
-
-        Args:
-            value: initial value.
-
-        Returns:
-            The `Constant`.
-        """
+        """Return a UFL constant; a new value needs no new compilation of the forms that contain it."""
         return fem.Constant(self.domain, PETSc.ScalarType(value))
 
     @property
@@ -61,14 +54,7 @@ class ControlledLoads(BodyModel):
         self._time[0].value = time
 
     def time_at(self, control: float) -> float:
-        """Return the process time at a value of the control, for the current step data (`StepData`).
-
-        Args:
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            Process time.
-        """
+        """Return the process time at a control, for the current step data (`StepData`)."""
         base, rate = self._time
         return float(base.value + rate.value * control)
 
@@ -78,11 +64,7 @@ class ControlledLoads(BodyModel):
         return self.time_at(float(self.control.value))
 
     def set_loads(self, setting: Any) -> None:
-        """Set loads, elastic supports and process time as functions of the control.
-
-        Args:
-            setting: amplitudes of the loads and of the time, and inactive items of the scene (`StepData`).
-        """
+        """Set loads, elastic supports and process time as functions of the control, from step data (`StepData`)."""
         for support, factor in self.elastic_supports:
             factor.value = float(not any(self.scene.items[i] is support for i in setting.inactive))
         for i, (load, base, rate) in enumerate(self._loads):
@@ -106,8 +88,7 @@ class ControlledLoads(BodyModel):
     def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
         """Return the residual and its derivatives by the control, through loads and through time (UFL, rank 1).
 
-        body: fields and integrals for the virtual works of the loads. A derivative that the scene does not have is
-        None.
+        body: fields and integrals for the virtual works. A derivative that the scene does not have is None.
         """
         v, control = self.test_function(), self._control
         residual = ufl.derivative(self.potential, self.w, v)

@@ -44,16 +44,7 @@ class Body(NamedTuple):
 
 
 def body(problem: Any, x: Any, control: float) -> Body | None:
-    """Evaluate deformation and shape of all elements of a solid in a state; collective.
-
-    Args:
-        problem: the `Problem`.
-        x: unknowns of the state (PETSc vector).
-        control: load parameter (control) of the state, dimensionless.
-
-    Returns:
-        The elements; None for a membrane, which has no elements across its thickness.
-    """
+    """Return the elements of a solid in a state, with deformation and shape; None for a membrane; collective."""
     forms = problem.forms
     domain = forms.domain
     if domain.topology.dim != 2 or domain.geometry.dim != 2:

@@ -139,121 +139,49 @@ class Formulation(ControlledLoads):
             past.refresh()
 
     def dissipated(self, factor: Any) -> Any:
-        """Return the weighted integral of the power that the materials dissipate.
-
-        Args:
-            factor: weight (UFL scalar).
-
-        Returns:
-            Integral over the reference volume of the factor times the dissipated power per volume (UFL, rank 0). Its
-            unit is stress length^3/time times the unit of the factor; in plane strain it is per unit depth.
-        """
+        """Return the integral of `factor` times the dissipated power per volume (UFL, rank 0)."""
         return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)
                    for terms in self.terms if terms.internal)
 
     def elastic(self, F: Any) -> Any:
-        """Return a deformation gradient without thermal expansion.
-
-        Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-
-        Returns:
-            Its elastic part (UFL, shape (3, 3)).
-        """
+        """Return the elastic part of a deformation gradient, without thermal expansion (UFL, shape (3, 3))."""
         return F if self._free is None else self._free.elastic(F)
 
     def temperatures(self, terms: MaterialTerms) -> np.ndarray:
-        """Return the temperatures at the quadrature points of a material.
-
-        Args:
-            terms: the material in the forms (`MaterialTerms`).
-
-        Returns:
-            Temperatures at the last accepted state and, if it is known, at the state before, shape (1 or 2, cells, q)
-            with q quadrature points of the energy in each cell.
-        """
+        """Return the temperatures at q points of the cells of `terms`, now and before, shape (1 or 2, cells, q)."""
         return np.asarray(self.temperature.last_two_states(terms.cells, terms.places))
 
     def update_temperature(self) -> None:
-        """Update the material constants to a changed temperature; collective.
-
-        The scales of length and stress of the forms do not change.
-
-        Raises:
-            InputError: a material constant has no value at a temperature.
-        """
+        """Update material constants to a changed temperature, else raise `InputError`; scales stay; collective."""
         following: list[Any] = [*self.terms, *([self._free] if self._free else [])]
         call_on_all_ranks(self.comm, [entry.update_temperature for entry in following])
 
     def cells_of(self, layers: list[str]) -> np.ndarray:
-        """Return the cells of some layers.
-
-        Args:
-            layers: names of the layers.
-
-        Returns:
-            Local cell numbers with ghosts, ascending, shape (n,).
-        """
+        """Return the local numbers of the cells of some layers, with ghosts, ascending, shape (n,)."""
         return np.sort(np.concatenate([self.mesh.cells.find(self.mesh.layers[name]) for name in layers]))
 
     def admissible(self) -> Any:
-        """Return the check of the body for inverted elements and points beyond the axis.
-
-        Returns:
-            A new `Admissible` for the fields `w`.
-        """
+        """Return a new check of the fields `w` for inverted elements and points beyond the axis."""
         return Admissible(self)
 
     def probe(self, problem: Any, points: Any) -> Probe:
-        """Return an object that evaluates the displacement at reference points (`Probe`).
-
-        Args:
-            problem: the `Problem`.
-            points: reference positions (R, Z), shape (n, 2), length.
-
-        Returns:
-            The `Probe`.
-        """
+        """Return the `Probe` of the displacement at reference points (R, Z), shape (n, 2), length."""
         return Probe(problem, points) if (old := self.scene.state_transfer) is None else old.probe(problem, points)
 
     def mean_row(self, constraint: Any) -> Any:
-        """Return the linear form that gives the mean of a displacement component over a boundary.
-
-        Args:
-            constraint: the `ConstrainedMean`, with boundary, component and weight of the mean.
-
-        Returns:
-            Mean of the dimensionless displacement component (UFL, rank 1).
-        """
+        """Return the linear form of the mean of a dimensionless displacement component over a boundary (UFL)."""
         raise NotImplementedError
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
-        """Return the unknowns that appear in no equation and stay 0.
-
-        Returns:
-            List of (subspace, local numbers of its unknowns).
-        """
+        """Return the unknowns that appear in no equation and stay 0, as (subspace, local numbers)."""
         return []
 
     def set_stiff(self) -> None:
-        """Set `w` to fields near the reference configuration at which the tangent is regular.
-
-        If the tangent is singular in the reference configuration, the path takes its first direction from these fields.
-        """
+        """Set `w` to fields with a regular tangent, for the first direction of a path if it is singular at 0."""
         self.w.x.array[:] = 0
 
     def compile(self, form: Any) -> Any:
-        """Compile a form.
-
-        Args:
-            form: UFL form.
-
-        Returns:
-            The compiled form.
-
-        Raises:
-            TimeoutError: another process has not finished the compilation of the same form.
-        """
+        """Return the compiled UFL form; raise `TimeoutError` if another process does not finish compiling it."""
         try:
             return _compat.compile_form(form)
         except TimeoutError as error:
@@ -263,11 +191,7 @@ class Formulation(ControlledLoads):
                 " .cache/fenics") from error
 
     def compile_ahead(self, *forms: Any) -> None:
-        """Compile forms together by one call of the C compiler, so that `compile` then finds them; collective.
-
-        Args:
-            forms: UFL forms, or None, which is skipped.
-        """
+        """Compile forms by one call of the C compiler, for `compile`; None is skipped; collective."""
         _compat.compile_ahead(self.comm, [form for form in forms if form is not None])
 
     @cached_property
@@ -281,63 +205,35 @@ class Formulation(ControlledLoads):
         return ufl.derivative(self.residual, self.w, ufl.TrialFunction(self.space))
 
     def path_forms(self) -> list[Any]:
-        """Return the forms that every run compiles, so that they can be compiled together.
-
-        Returns:
-            List of UFL forms; None for a derivative that the scene does not have.
-        """
+        """Return the UFL forms that every run compiles, to compile them together; None for a missing derivative."""
         areas = {contact.on: self.area(contact.on) for contact in self.scene.contacts}
         return [self.residual, self.tangent, self.control_derivative, self.time_derivative, self.metric_row(),
                 *areas.values()]
 
     def integral(self, form: Any) -> float:
-        """Compile a form of rank 0 and return its value over all ranks.
-
-        Args:
-            form: UFL form of rank 0.
-
-        Returns:
-            Value of the form, in its own unit.
-        """
+        """Return the value of a UFL form of rank 0 over all ranks, in its own unit."""
         return float(combined(self.comm, fem.assemble_scalar(self.compile(form)), MPI.SUM))
 
     def test_function(self) -> Any:
-        """Return the test function of all fields.
-
-        Returns:
-            The test function (UFL, dimensionless).
-        """
+        """Return the test function of all fields (UFL, dimensionless)."""
         return ufl.TestFunction(self.space)
 
     def test_displacement(self) -> Any:
-        """Return the test function of the displacement.
-
-        Returns:
-            Virtual displacement (UFL, length, shape (2,)).
-        """
+        """Return the virtual displacement (UFL, length, shape (2,))."""
         return self.constant(self.length) * ufl.split(self.test_function())[0]
 
     def metric_row(self) -> Any:
         r"""Return the linear form :math:`\frac{1}{V} \int \sum_i v_i \, dV`, a lumped mass matrix of the displacement.
-
-        Returns:
-            Linear form (UFL, rank 1, dimensionless) in the test functions v_i of the displacement components.
         """
         v = ufl.split(self.test_function())[0]
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})
         return sum(v[i] for i in range(self.domain.geometry.dim)) * self.weight / self.constant(self.volume) * dx
 
     def viscosity(self) -> Any:
-        r"""Return the bilinear form of a viscous stress, scaled like the residual.
+        r"""Return the bilinear form of a viscous stress, scaled like the residual (UFL, dimensionless).
 
         .. math::
             \frac{1}{V} \int \dot F : \delta F \, dV
-
-        V is the reference volume. :math:`\dot F` and :math:`\delta F` are the changes of the deformation gradient by
-        trial and test function.
-
-        Returns:
-            Bilinear form (UFL, rank 2, dimensionless).
         """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         potential = ufl.inner(F, F) / 2 * self.weight / self.constant(self.volume)
@@ -345,23 +241,9 @@ class Formulation(ControlledLoads):
         return ufl.derivative(ufl.derivative(potential * dx, self.w, self.test_function()), self.w)
 
     def thickness(self, boundary: str) -> float:
-        """Return the mean thickness of the body behind a boundary.
-
-        Args:
-            boundary: name of the boundary.
-
-        Returns:
-            Reference volume of the body divided by the reference area of the boundary, length.
-        """
+        """Return the mean thickness behind a boundary, reference volume over its reference area, length."""
         return self.volume / self.integral(self.area(boundary))
 
     def area(self, boundary: str) -> Any:
-        """Return the scalar form of the reference area of a boundary.
-
-        Args:
-            boundary: name of the boundary.
-
-        Returns:
-            The form (UFL, rank 0).
-        """
+        """Return the scalar form of the reference area of a boundary (UFL, rank 0)."""
         return self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1]

@@ -15,14 +15,7 @@ FORMULATIONS: dict[type[Model], type[Formulation]] = {MixedPressure: Solid, Disp
 
 
 def formulate(scene: Any) -> Formulation:
-    """Build the variational forms of a model declaration (`Scene`).
-
-    Args:
-        scene: the `Scene`.
-
-    Returns:
-        A `Formulation`; its class is `Kinematics.formulation` if it is set, else it belongs to the body model.
-    """
+    """Return the `Formulation` of a scene: `Kinematics.formulation` if set, else that of the body model."""
     if (formulation := scene.kinematics.formulation) is not None:
         return formulation(scene)
     return next(FORMULATIONS[kind] for kind in type(scene.model).__mro__ if kind in FORMULATIONS)(scene)

@@ -46,12 +46,5 @@ class FreeStretch:
         self._coefficient.update(map(self._temperatures, self._cells))
 
     def elastic(self, F: Any) -> Any:
-        """Return the elastic part of a deformation gradient.
-
-        Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-
-        Returns:
-            F / J_T^(1/3), with the volume ratio J_T of the free thermal expansion (UFL, shape (3, 3)).
-        """
+        """Return F / J_T^(1/3) with the volume ratio J_T of free thermal expansion (UFL, shape (3, 3))."""
         return F / self.stretch

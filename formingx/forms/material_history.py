@@ -57,13 +57,7 @@ class MaterialHistory:
         self._terms.start.value = 0.0
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the internal variables to the end of a step, for the state to which the forms are set.
-
-        Args:
-            x: not used; the fields of the forms count.
-            control: load parameter (control) at the end of the step, dimensionless.
-            start: not used.
-        """
+        """Update the internal variables to the end of a step, for the state to which the forms are set."""
         self._now = None
         for name, values in self._values_at_end(self._cells).items():
             self._set(name, self._cells, values)
@@ -86,22 +80,14 @@ class MaterialHistory:
             self._set(name, self._cells, np.asarray(self._terms.material.internal[name], dtype=float).ravel())
 
     def get(self) -> InternalVariables:
-        """Return the current internal variables.
-
-        Returns:
-            The variables and the process time; the arrays are read-only.
-        """
+        """Return the internal variables and the process time; the arrays are read-only."""
         if self._now is None:
             values = {name: self._array(name)[self._rows(name, self._own)] for name in self._sizes}
             self._now = _unchangeable(InternalVariables(float(self._terms.start.value), values))
         return self._now
 
     def put(self, variables: InternalVariables) -> None:
-        """Set the internal variables and the process time.
-
-        Args:
-            variables: values from `get`.
-        """
+        """Set the internal variables and the process time to values from `get`."""
         if variables is self._now:
             return
         for name, values in variables.values.items():
@@ -111,14 +97,9 @@ class MaterialHistory:
         self._now = variables
 
     def save(self, variables: InternalVariables) -> dict[str, Any]:
-        """Return internal variables as arrays, the same on all ranks; collective.
+        """Return "time", "cells" (numbers of the script, ascending) and "values" as data of all ranks; collective.
 
-        Args:
-            variables: values from `get`.
-
-        Returns:
-            {"time": process time, "cells": cell numbers in the order in which the script gave the cells, ascending,
-            "values": {name: values in these cells, shape (cells, points, components)}}.
+        "values" is {name: array of shape (cells, points, components)}.
         """
         comm = self._forms.comm
         numbers = gathered(comm, self._numbers)
@@ -127,16 +108,9 @@ class MaterialHistory:
                 "values": {name: gathered(comm, v)[order] for name, v in variables.values.items()}}
 
     def load(self, data: dict[str, Any]) -> InternalVariables:
-        """Return the internal variables of this rank from stored data of all ranks.
+        """Return the internal variables of this rank from data that `save` returned, such as those of a checkpoint.
 
-        Args:
-            data: data that `save` returned, such as the contents of a checkpoint.
-
-        Returns:
-            Values that `put` accepts.
-
-        Raises:
-            InputError: the data belong to another mesh or another material.
+        Raise `InputError` if they belong to another mesh or another material.
         """
         numbers, values = np.array(data.get("cells", []), dtype=np.int64), data.get("values", {})
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
@@ -149,19 +123,10 @@ class MaterialHistory:
 
     def transfer(self, source: MaterialHistory, variables: InternalVariables, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
-        """Interpolate the internal variables of a material from another mesh to this one; collective.
+        """Interpolate the internal variables `variables` of `source`, on another mesh, to this mesh; collective.
 
-        The forms of both problems must be set to the state.
-
-        Args:
-            source: history of the material on the other mesh.
-            variables: history variables of `source` in the state.
-            x: not used.
-            control: not used.
-            mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
-
-        Returns:
-            Values that `put` accepts.
+        The forms of both problems must be set to the state. mapping: function from reference points of the other mesh,
+        shape (n, coordinates), to points of this mesh.
         """
         interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
         shapes = self._terms.material.tensor_powers
@@ -192,19 +157,12 @@ class MaterialHistory:
         return self._storage[name][0]
 
     def _rows(self, name: str, cells: np.ndarray) -> np.ndarray:
-        """Return the rows of an internal variable's values that belong to some cells, shape (cells, points of a cell).
-
-        name: the internal variable, whose values have a row for each quadrature point. cells: local numbers, shape
-        (cells,).
-        """
+        """Return the rows of an internal variable's values in some cells, shape (cells, points of a cell)."""
         return self._storage[name][1][cells]
 
     @cached_property
     def _storage(self) -> dict[str, tuple[np.ndarray, np.ndarray]]:
-        """{name: (values, row numbers of each cell)} of the internal variables.
-
-        The values have the shape (quadrature points, components), the row numbers (cells, points of a cell).
-        """
+        """{name: (values, shape (quadrature points, components), rows, shape (cells, points of a cell))}."""
         return {name: (np.asarray(f.x.array).reshape(-1, self._sizes[name]), np.asarray(f.function_space.dofmap.list))
                 for name, f in self._terms.internal.items()}
 

@@ -73,27 +73,15 @@ class MaterialTerms:
         return bool(self.internal or self.past_integrals)
 
     def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:
-        """Return a `Function` with a value at every quadrature point of the energy.
-
-        Args:
-            shape: shape of a value.
-
-        Returns:
-            The `Function`, with value 0.
-        """
+        """Return a zero `Function` with a value of a given shape at every quadrature point of the energy."""
         element = basix.ufl.quadrature_element(self.forms.domain.basix_cell(), value_shape=shape, scheme="default",
                                                degree=self.forms.scene.quadrature_degree)
         return fem.Function(fem.functionspace(self.forms.domain, element))
 
     def position_coefficient(self, function: Any) -> fem.Function:
-        """Evaluate a function of the reference position at the quadrature points of the energy.
+        """Return a quadrature `Function` of f(R, Z), of the reference position on the first mesh of a run, length.
 
-        Args:
-            function: f(R, Z) of the reference position on the first mesh of a run (arrays, length). In a membrane, Z is
-                the height halfway through the layer.
-
-        Returns:
-            `Function` of a quadrature element with the values of f.
+        In a membrane, Z is the height halfway through the layer.
         """
         found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.state_transfer
 
@@ -106,14 +94,9 @@ class MaterialTerms:
         return found
 
     def temperature_coefficient(self, function: Any) -> Any:
-        """Evaluate a function of the temperature at the quadrature points of the energy.
+        """Return f(T) (UFL scalar) at the quadrature points of the energy, at the end of a step.
 
-        Args:
-            function: f(T) of an array of temperatures.
-
-        Returns:
-            f (UFL scalar) at the end of a step. For a constant named in `Material.flow_constants`, f in the middle of
-            the step.
+        A constant named in `Material.flow_constants` is evaluated in the middle of the step.
         """
         forms, found = self.forms, self.quadrature_function()
         law = getattr(function, "clamped", function)          # a user's own constant may be any function
@@ -122,26 +105,15 @@ class MaterialTerms:
         return coefficient.at_time(forms.time - (self._time_step / 2 if self._in_middle else 0))
 
     def update_temperature(self) -> None:
-        """Update the material constants to a changed temperature of the body.
-
-        Raises:
-            InputError: a constant has no finite value at a temperature.
-        """
+        """Update the material constants to a changed temperature, else raise `InputError`."""
         temperatures = [self.forms.temperatures(self)] if self._coefficients else []
         for coefficient in self._coefficients:
             coefficient.update(temperatures)
 
     def mesh_coefficient(self, expression: Any) -> Any:
-        """Return a coefficient that is a UFL expression on the scene's mesh, if the fields live on this mesh.
+        """Return a UFL scalar on the scene's mesh as a coefficient.
 
-        Args:
-            expression: UFL scalar.
-
-        Returns:
-            The same expression.
-
-        Raises:
-            InputError: the fields live on another mesh, such as the mid-surface of a membrane.
+        Raise `InputError` if the fields live on another mesh, such as the mid-surface of a membrane.
         """
         if self.forms.domain is not self.forms.scene.mesh.domain:
             raise InputError(f"{self.material}: a membrane has its own mesh: give the constant as a function of"
@@ -149,40 +121,21 @@ class MaterialTerms:
         return expression
 
     def step_energy(self, F: Any) -> Any:
-        """Return the incremental potential of the step per reference volume.
-
-        Args:
-            F: elastic deformation gradient (UFL, shape (3, 3)).
-
-        Returns:
-            Potential (UFL, stress); without history variables it is the strain energy.
-        """
+        """Return the incremental potential of the step per reference volume (UFL, stress); F: elastic."""
         if not self.has_history:
             return self.material.strain_energy(F, **self.constants)
         return self.material.step_energy(F, self.internal | self.past_integrals, self._time_step, **self.constants)
 
     def stored_energy(self, F: Any) -> Any:
-        """Return the stored energy per reference volume.
-
-        Args:
-            F: elastic deformation gradient (UFL, shape (3, 3)).
-
-        Returns:
-            Energy (UFL, stress).
-        """
+        """Return the stored energy per reference volume (UFL, stress); F: elastic, shape (3, 3)."""
         if not self.has_history:
             return self.material.strain_energy(F, **self.constants)
         return self.material.stored_energy(F, self.internal | self.past_integrals, **self.constants)
 
     def unsymmetric_work(self, F: Any, derivative: Any) -> Any:
-        """Return the virtual work of stresses that have no potential, per reference volume.
+        """Return the virtual work of stresses without a potential, per reference volume (UFL, stress).
 
-        Args:
-            F: elastic deformation gradient (UFL, shape (3, 3)).
-            derivative: function that returns the variation of a UFL expression by virtual displacements.
-
-        Returns:
-            Virtual work (UFL, stress); None if the tangent of the material is symmetric.
+        `derivative` gives the variation of a UFL expression. None if the tangent is symmetric.
         """
         if self.material.symmetric:
             return None
@@ -190,57 +143,25 @@ class MaterialTerms:
         return self.material.integral.unsymmetric_work(C, [derivative(c) for c in C], self.past_integrals)
 
     def equilibrium_energy(self, F: Any) -> Any:
-        """Return the energy after complete relaxation, per reference volume.
-
-        Args:
-            F: elastic deformation gradient (UFL, shape (3, 3)).
-
-        Returns:
-            Energy (UFL, stress); None if the material has none.
-        """
+        """Return the energy after complete relaxation, per reference volume (UFL, stress), or None."""
         return self.material.equilibrium_energy(F, **self.constants)
 
     def elastic_stretches(self, F: Any) -> list[Any]:
-        """Return the largest principal elastic stretch of each relaxing branch.
-
-        Args:
-            F: elastic deformation gradient (UFL, shape (3, 3)).
-
-        Returns:
-            List of stretches (UFL scalars).
-        """
+        """Return the largest principal elastic stretch of each relaxing branch (UFL scalars)."""
         return self.material.elastic_stretches(F, self.internal, **self.constants)
 
     def dissipation(self, F: Any) -> Any:
-        """Return the dissipated power per reference volume.
-
-        Args:
-            F: elastic deformation gradient (UFL, shape (3, 3)).
-
-        Returns:
-            Power (UFL, stress over time).
-        """
+        """Return the dissipated power per reference volume (UFL, stress over time); F: elastic."""
         return self.material.dissipation(F, self.internal, **self.constants)
 
     def damage_energy(self) -> Any:
-        """Return the energy dissipated by damage per reference volume.
-
-        Returns:
-            Energy (UFL, stress).
-        """
+        """Return the energy dissipated by damage per reference volume (UFL, stress)."""
         return self.material.damage_energy(self.internal, **self.constants)
 
     def updated(self, F: Any) -> dict[str, Any]:
-        """Return the internal variables at the end of the step.
+        """Return {name: internal variable (UFL)} at the end of the step; F: elastic, UFL, shape (3, 3).
 
-        Args:
-            F: elastic deformation gradient (UFL, shape (3, 3)).
-
-        Returns:
-            {name: internal variable (UFL)}.
-
-        Raises:
-            InputError: `Material.updated` returns other names or shapes than `Material.internal` has.
+        Raise `InputError` if `Material.updated` returns other names or shapes than `Material.internal` has.
         """
         found = self.material.updated(F, self.internal, self._time_step, **self.constants)
         shapes = {name: ufl.as_ufl(value).ufl_shape for name, value in found.items()}

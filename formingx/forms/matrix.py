@@ -52,12 +52,9 @@ class ExtendedMatrix:
             self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
 
     def constrain(self, bcs: list, rows: list[np.ndarray]) -> None:
-        """Set the constraints of the following tangents.
+        """Set DirichletBCs and rows of the constraint matrix C, owned entries, shape (n,) each, of later tangents.
 
-        Args:
-            bcs: DirichletBCs of constrained unknowns; their rows and columns become unit vectors.
-            rows: list of the rows of the constraint matrix C, locally owned entries, shape (n,) each. If a row is 0 on
-                all ranks, row and column of its multiplier become unit vectors too.
+        Constrained unknowns, and the multipliers of rows that are 0 on all ranks, get unit vectors.
         """
         self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]
         self._constrained = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
@@ -71,15 +68,9 @@ class ExtendedMatrix:
                                   np.concatenate([w for _, w in parts])))
 
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
-        """Assemble the matrix for the current values of the form's functions.
+        """Assemble and return the matrix, with blocks (dofs, shape (n, m), with ghosts; values, shape (n, m, m)) added.
 
-        Args:
-            blocks: list of (dofs, values): local unknowns with ghosts, shape (n, m), and values added to the tangent,
-                shape (n, m, m). The m unknowns of a block must share a cell. Entries of constrained unknowns are
-                skipped.
-
-        Returns:
-            The assembled matrix.
+        The m unknowns of a block must share a cell. Entries of constrained unknowns are skipped.
         """
         A, add = self.mat, PETSc.InsertMode.ADD_VALUES
         A.zeroEntries()

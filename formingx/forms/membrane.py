@@ -51,26 +51,14 @@ class MidSurface(Formulation):
 
     @property
     def bodies(self) -> list[tuple[Any, list[str]]]:
-        """Undefined for a membrane.
-
-        Raises:
-            InputError: always; a membrane has no stress through its thickness.
-        """
+        """Undefined for a membrane: raises `InputError`."""
         raise InputError("a membrane has no stress through its thickness, nor between its layers: use a solid model,"
                          " MixedPressure()")
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """Return the normal of the mid-surface away from the loaded face, and the measure of the mid-surface.
+        """Return the normal away from a loaded whole face (UFL, shape (2,)), and the measure of the mid-surface.
 
-        Args:
-            name: boundary that is the whole lower or the whole upper face.
-            quadrature_degree: degree of the quadrature on it.
-
-        Returns:
-            Reference normal (UFL, shape (2,)) and measure.
-
-        Raises:
-            InputError: the boundary is not a whole face.
+        Raise `InputError` if the boundary is not the whole lower or upper face.
         """
         nodes = self.scene.mesh.nodes_of(name)
         near = 1e-8 * self.length
@@ -85,16 +73,7 @@ class MidSurface(Formulation):
     def constraints(self, support: Any) -> list[Any]:
         """Return the constraints that a support at an end of the membrane imposes on the displacement.
 
-        A constraint of the mean displacement of an end becomes a constraint of the displacement of its single point.
-
-        Args:
-            support: the `Support`.
-
-        Returns:
-            List of `Constrained`.
-
-        Raises:
-            InputError: the boundary is not an end of the membrane.
+        A mean over an end becomes its single point. Raise `InputError` elsewhere.
         """
         items = [c if isinstance(c, Constrained) else Constrained(c.component, on=c.on) for c in support.constraints()]
         for item in items:
@@ -104,28 +83,12 @@ class MidSurface(Formulation):
         return items
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Return the points of the mid-surface at the same R.
-
-        Args:
-            points: reference positions, shape (n, 2), length.
-
-        Returns:
-            Reference positions on the mid-surface, shape (n, 2), length.
-        """
+        """Return the points of the mid-surface at the same R, shape (n, 2), length."""
         R = np.asarray(points, dtype=float)[:, 0]
         return np.column_stack([R, np.interp(R, self._R, (self._low + self._high) / 2)])
 
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return the heights halfway between the faces of a layer.
-
-        Args:
-            layer: name of the layer.
-            R: radii, shape (n,), length.
-            Z: not used.
-
-        Returns:
-            Heights, shape (n,), length.
-        """
+        """Return the heights halfway between the faces of a layer at radii R, shape (n,), length."""
         low, high = self._ends[layer]
         return np.interp(R, self._R, (low + high) / 2)
 
@@ -138,14 +101,7 @@ class MidSurface(Formulation):
         return np.arange(topology.index_map(1).size_local + topology.index_map(1).num_ghosts, dtype=np.int32)
 
     def temperatures(self, terms: Any) -> np.ndarray:
-        """Return the temperatures halfway between the faces of a layer; in a membrane they do not change with time.
-
-        Args:
-            terms: the material of the layer in the forms (`MaterialTerms`).
-
-        Returns:
-            Temperatures at the q quadrature points of each cell, shape (1, cells, q).
-        """
+        """Return the temperatures halfway between the faces of a layer, shape (1, cells, q); they stay constant."""
         nodes = cell_node_positions(self.domain, terms.cells)
         geometry = basix.ufl.element("Lagrange", "interval", _compat.coordinate_map(self.domain).degree)
         shapes: Any = geometry.tabulate(0, terms.places)
@@ -157,10 +113,7 @@ class MidSurface(Formulation):
         return MidSurfaceProbe(problem, points)
 
     def set_stiff(self) -> None:
-        """Set `w` to a small stretch in all directions, whose tension makes the tangent regular.
-
-        If the tangent is singular in the reference configuration, the path takes its first direction from these fields.
-        """
+        """Set `w` to a small stretch in all directions, whose tension makes the tangent regular (`Formulation`)."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X[:self.scene.kinematics.components])
 
     def _make_mesh(self) -> Mesh:

@@ -57,35 +57,17 @@ class Outline:
         self.reference_edges = self._gathered(self._own)
 
     def edges(self) -> np.ndarray:
-        """Return the deformed edges; collective.
-
-        Returns:
-            Start, end and midpoint of each edge, shape (m, 3, 2), length.
-        """
+        """Return start, end and midpoint of each deformed edge, shape (m, 3, 2), length; collective."""
         return self._gathered(self._own + self._forms.length * self._forms.w.x.array[self._dofs])
 
     def mask(self, boundary: str) -> np.ndarray:
-        """Return a mask of the edges that belong to a named boundary; collective.
-
-        Args:
-            boundary: name of the boundary.
-
-        Returns:
-            True for each edge on it, shape (m,).
-        """
+        """Return a mask of the edges that belong to a named boundary, shape (m,); collective."""
         return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
 
     def ordered(self, caller: str) -> list[int]:
-        """Return the edges in order around the body.
+        """Return the edge numbers in order around the body, counterclockwise.
 
-        Args:
-            caller: name of the calling function, for the message.
-
-        Returns:
-            Edge numbers, counterclockwise.
-
-        Raises:
-            InputError: the body has a hole or several parts.
+        Raise `InputError` with the name of the caller if the body has a hole or several parts.
         """
         after = {int(a): k for k, (a, _) in enumerate(self.ends)}
         order = [0]
@@ -96,14 +78,9 @@ class Outline:
         return order
 
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
-        """Divide curved edges into straight pieces.
+        """Divide curved edges (start, end, midpoint), shape (m, 3, 2), length, into straight pieces.
 
-        Args:
-            edges: start, end and midpoint of each edge, shape (m, 3, 2), length.
-            parts: number of pieces of an edge.
-
-        Returns:
-            Points, shape (n, 2), length; point numbers of the ends of each piece, shape (m parts, 2).
+        Return points, shape (n, 2), length, and the end numbers of each piece, shape (m parts, 2).
         """
         m, corners = len(edges), int(self.ends.max()) + 1
         points = np.empty((corners + m * (parts - 1), edges.shape[-1]))
@@ -114,15 +91,9 @@ class Outline:
         return points, np.stack([chain[:, :-1], chain[:, 1:]], -1).reshape(-1, 2)
 
     def self_intersection(self, edges: np.ndarray) -> np.ndarray | None:
-        """Find a self-intersection of the deformed boundary.
+        """Return a point where deformed edges, shape (m, 3, 2), length, cross, shape (2,), length; else None.
 
         Crossings of edges with a common neighbour are ignored: an element that bends over a sharp edge makes a crease.
-
-        Args:
-            edges: start, end and midpoint of each deformed edge, as `edges()` returns them, shape (m, 3, 2), length.
-
-        Returns:
-            A point where edges cross, shape (2,), length; None if there is none.
         """
         if crossing_point(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
             return None
@@ -142,15 +113,7 @@ class Outline:
 
 
 def edge_points(edges: np.ndarray, parts: int = _SEARCH_PIECES) -> np.ndarray:
-    """Return points on parabolic edges, at equal intervals of the parameter from start to end.
-
-    Args:
-        edges: start, end and midpoint of each edge, shape (m, 3, 2), length.
-        parts: number of intervals of the parameter.
-
-    Returns:
-        Points from start to end, shape (m, parts + 1, 2), length.
-    """
+    """Return equidistant points on parabolic edges (start, end, midpoint), shape (m, parts + 1, 2), length."""
     return np.einsum("pk,mki->mpi", _shapes(parts), edges)
 
 
@@ -162,15 +125,7 @@ def _shapes(parts: int) -> np.ndarray:
 
 
 def ends_first(nodes: np.ndarray, X: np.ndarray) -> np.ndarray:
-    """Sort the three nodes of an edge: the two nodes that are furthest apart come first.
-
-    Args:
-        nodes: node numbers, shape (3,).
-        X: reference positions of all nodes, shape (n, 2), length.
-
-    Returns:
-        Numbers of both ends and of the middle node, shape (3,).
-    """
+    """Sort the node numbers of an edge, shape (3,): the two furthest apart come first; X: shape (n, 2), length."""
     away = np.linalg.norm(X[nodes][:, None] - X[nodes][None], axis=-1)
     i, j = np.unravel_index(np.argmax(away), (3, 3))
     return nodes[[i, j, 3 - i - j]]

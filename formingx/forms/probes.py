@@ -44,34 +44,17 @@ class Probe:
         self._weights = _basis(forms.displacement_element, 0, self._reference)
 
     def _dofs_of(self, cells: np.ndarray) -> np.ndarray:
-        """Return the local numbers of the displacement unknowns of m cells, shape (m, components, dim).
-
-        dim is the number of shape functions of a displacement component in a cell.
-        """
+        """Return the displacement unknowns of m cells, with dim for each component, shape (m, components, dim)."""
         return np.array([[sub.cell_dofs(c) for sub in self._subs] for c in cells], dtype=np.int64).reshape(
             len(cells), self._components, self._problem.forms.displacement_element.dim)
 
     def displacement(self, x: Any) -> np.ndarray:
-        """Set the fields of the forms, and return the displacement at the points; collective.
-
-        Args:
-            x: unknowns (PETSc vector).
-
-        Returns:
-            Displacement, shape (n, components), length.
-        """
+        """Set the fields of the forms to x, and return the displacement, shape (n, components), length; collective."""
         self._problem.set_fields(x.array_r)
         return self._read()
 
     def displacement_in(self, state: Any) -> np.ndarray:
-        """Return the displacement at the points in a state; the fields of the forms are restored; collective.
-
-        Args:
-            state: a `State` of the path.
-
-        Returns:
-            Displacement, shape (n, components), length.
-        """
+        """Return the displacement in a state, shape (n, components), length, and restore the fields; collective."""
         w = self._problem.forms.w.x.array
         before = w.copy()
         try:
@@ -88,50 +71,37 @@ class Probe:
         return self._problem.comm.allreduce(values, MPI.SUM)
 
     def stretch_row(self) -> tuple[np.ndarray, float]:
-        r"""Return a vector that gives the in-plane stretch at the pole as a function of the unknowns x.
+        r"""Return a row, owned entries, shape (n,), and a power for the in-plane stretch at the pole.
 
         .. math::
             \lambda = (1 + \text{row} \cdot x)^{\text{power}}
 
-        The two points of the probe lie on the axis, the lower one first. The material is incompressible: the thickness
-        stretch between them gives the in-plane stretch.
-
-        Returns:
-            Row, locally owned entries, shape (n,); exponent `power`: -1/2 if axisymmetric, -1 in plane strain.
+        The two points lie on the axis, the lower one first. Incompressibility gives the in-plane stretch from that of the
+        thickness: the power is -1/2 if axisymmetric, -1 in plane strain.
         """
         (_, low), (_, high) = self.points
         row = self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low)
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        r"""Return a vector whose product with the unknowns x is a weighted sum of the displacements of the points.
+        r"""Return a vector, owned entries, whose product with x is a weighted sum of the points' displacements.
 
         .. math::
             \text{row} \cdot x = \frac{1}{L} \sum_{i,c} w_{ic} u_{ic}
 
-        u_ic is the displacement component c of point i; L is the length scale of the unknowns (`forms.length`).
-
-        Args:
-            factors: weights w_ic, shape (n, components).
-
-        Returns:
-            Row, locally owned entries.
+        factors: weights w_ic of component c of point i, shape (n, components). L is `forms.length`.
         """
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
-        """Return the dimensionless displacement of this rank's points, shape (m, 2).
-
-        values: displacement unknowns of the cells of the m points, shape (m, 2, dim); dim is the number of shape
-        functions of a component in a cell.
-        """
+        """Return the dimensionless displacement of m points, shape (m, 2), from those of cells, shape (m, 2, dim)."""
         return np.einsum("kj,kij->ki", self._weights, values)
 
     def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
         """Return the row of a weighted sum of displacements of points, locally owned entries.
 
-        factors: weights of all n points, shape (n, components). point_weights: for the m points in cells of this rank,
-        values of the `dim` shape functions of the cell at the point, shape (m, dim).
+        factors: of all n points, shape (n, components). point_weights: shape functions at the m points in cells of this
+        rank, shape (m, dim).
         """
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
@@ -199,42 +169,27 @@ class MidSurfaceProbe(Probe):
         self._tangent = np.where(self._meet[:, None], both / self._mean_length, self._tangent)
 
     def _mean_over_elements(self, values: np.ndarray) -> np.ndarray:
-        """Return the mean of a vector over both elements at points where two elements meet; collective.
+        """Return the mean of a vector over both elements at points where two elements meet, shape (n, 2); collective.
 
-        values: one vector for each element end of this rank that lies on such a point, in the order of `_ends`, shape
-        (ends, 2). The result has the shape (n, 2) for the n points of the probe, 0 at points where no elements meet.
+        values: at the ends of elements, in the order of `_ends`, shape (ends, 2).
         """
         total = np.zeros((len(self.points), self._components))
         np.add.at(total, self._ends[0], values / 2)
         return self._problem.comm.allreduce(total, MPI.SUM)
 
     def stretch_row(self) -> tuple[np.ndarray, float]:
-        r"""Return a vector that gives the in-plane stretch at the pole of a membrane as a function of the unknowns x.
-
-        There the membrane is normal to the axis, and the stretch is
+        r"""Return the row, shape (n,), and the power 1 for the in-plane stretch at the pole of a membrane.
 
         .. math::
             1 + \frac{\partial u_r}{\partial R} = 1 + \text{row} \cdot x
-
-        Returns:
-            Row, locally owned entries, shape (n,); exponent of (1 + row . x), which is 1 for a membrane.
         """
         row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
         return row, 1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """Return a vector whose product with the unknowns x is a weighted sum of displacements on the mid-surface.
+        """Return the row of `Probe.row`, for weights of the displacement on the mid-surface, shape (n, components).
 
-        The sum is divided by the length scale of the unknowns (`forms.length`), as in `Probe.row`.
-
-        Args:
-            factors: weights of the displacement components, shape (n, components).
-
-        Returns:
-            Row, locally owned entries.
-
-        Raises:
-            InputError: a point is not on the mid-surface.
+        Raise `InputError` if a point is not on the mid-surface.
         """
         middle = self._problem.forms.nearest(self.points)
         outside = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
@@ -271,10 +226,9 @@ def _normal(tangents: np.ndarray) -> np.ndarray:
 
 
 def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
-    """Return the dim shape functions of an element at m points of its reference cell, shape (m, dim).
+    """Return the dim shape functions of an element, or first derivatives on an interval, at m points, shape (m, dim).
 
-    derivative: 0 for the values; 1 for the derivatives with respect to the coordinate of a reference interval.
-    reference: coordinates of the points in the reference cell, shape (m, dimension of the cell).
+    reference: coordinates in the reference cell, shape (m, dimension of the cell).
     """
     if not len(reference):                             # basix does not take an empty set
         return np.zeros((0, element.dim))
@@ -282,13 +236,5 @@ def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
 
 
 def probe(problem: Any, points: Any) -> Probe:
-    """Return the probe of the displacement at fixed reference points, for every model of the body.
-
-    Args:
-        problem: the `Problem`.
-        points: reference positions (R, Z), shape (n, 2), length.
-
-    Returns:
-        The `Probe`.
-    """
+    """Return the `Probe` of the displacement at reference points (R, Z), shape (n, 2), length, for every model."""
     return problem.forms.probe(problem, points)

@@ -41,17 +41,7 @@ class StepData:
 
     @classmethod
     def first(cls, scene: Any) -> StepData:
-        """Return the step data of the unloaded scene, in which all loads, supports and contacts are active.
-
-        If a load, support or contact of the scene is controlled, its amplitude is the control. All other amplitudes are
-        0.
-
-        Args:
-            scene: the `Scene`.
-
-        Returns:
-            The step data.
-        """
+        """Return the step data of the unloaded scene, with the driven item as the control and all items active."""
         rate = [float(scene.driven is not None and t.driven) for t in scene.items] + [0.0]
         return cls([0.0] * len(rate), rate, [])
 
@@ -71,27 +61,13 @@ class StepData:
         return not any(self.rate[:-1])
 
     def amplitude(self, number: int, control: float) -> float:
-        """Return the amplitude of a load, support or contact, or the process time.
-
-        Args:
-            number: index of the load, support or contact in `Scene.items`; -1 for the process time.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            Amplitude, or process time.
-        """
+        """Return the amplitude of item `number` of `Scene.items`, or the process time for -1."""
         return self.base[number] + self.rate[number] * control
 
     def acting_amplitude(self, number: int, control: float) -> float:
-        """Return the amplitude of a load that acts on the body.
+        """Return the amplitude of a load that acts on the body, 0 if inactive.
 
-        Args:
-            number: index of the load in `Scene.items`.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            The amplitude; 0 for an inactive load. If `fading` is True, the amplitude of a just activated load is
-            multiplied by the control, that of a just deactivated load by 1 - control.
+        With `fading`, a new load is multiplied by the control, a removed one by 1 - control.
         """
         share = float(number not in self.inactive)
         if self.fading and number in self.changed:
@@ -99,27 +75,13 @@ class StepData:
         return share * self.amplitude(number, control)
 
     def amplitudes(self, control: float) -> list[float]:
-        """Return the amplitudes of all loads, supports and contacts, and the process time.
-
-        Args:
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            Amplitudes in the order of `Scene.items`, then the process time.
-        """
+        """Return the amplitudes in the order of `Scene.items`, then the process time."""
         return [self.amplitude(i, control) for i in range(len(self.base))]
 
     def transferred(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[StepData, float]:
         """Return step data and control that give the same values in the user's units on the next mesh of a run.
 
-        Args:
-            before: unit of each load, support and contact on the current mesh: its value in the user's units at
-                amplitude 1, in the order of `Scene.items`. The last entry, 1, belongs to the process time.
-            now: the same units on the next mesh.
-            control: control on the current mesh, dimensionless.
-
-        Returns:
-            Step data and control on the next mesh.
+        before, now: value of each item at amplitude 1 on both meshes, in the user's units, then 1 for the time.
         """
         ratio = [b / n for b, n in zip(before, now, strict=True)]
         control_ratio = 1.0 if self.controlled is None else ratio[self.controlled]

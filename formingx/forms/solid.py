@@ -28,15 +28,7 @@ class Solid(Formulation):
     """
 
     def boundary(self, name: str, quadrature_degree: int) -> ufl.Measure:
-        """Return the UFL measure of a boundary in the reference configuration.
-
-        Args:
-            name: name of the boundary.
-            quadrature_degree: degree of the quadrature on it.
-
-        Returns:
-            The measure.
-        """
+        """Return the UFL measure of a boundary in the reference configuration."""
         return self.ds(self.scene.mesh.boundaries[name], metadata={"quadrature_degree": quadrature_degree})
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
@@ -71,23 +63,12 @@ class Solid(Formulation):
         return [*super().path_forms(), *rows.values()]
 
     def length_row(self, boundary: str) -> Any:
-        """Return the linear form of the tributary lengths of the nodes of a boundary.
-
-        Args:
-            boundary: name of the boundary.
-
-        Returns:
-            Linear form (UFL, rank 1); its entry at the first component of a node is the tributary length of the node.
-        """
+        """Return the linear form of the tributary lengths of boundary nodes, at their first components (UFL)."""
         metadata = {"quadrature_rule": "GLL", "quadrature_degree": 3}
         return ufl.split(self.test_function())[0][0] * self.ds(self.scene.mesh.boundaries[boundary], metadata=metadata)
 
     def idle_unknowns(self) -> list[tuple[Any, np.ndarray]]:
-        """Return the pressures that belong to no cell of their layers.
-
-        Returns:
-            List of (subspace, local numbers of its unknowns).
-        """
+        """Return the pressures that belong to no cell of their layers, as (subspace, local numbers)."""
         found, mesh, dofmap = [], self.mesh, self.space.dofmap
         for colour in sorted(set(self.pressure_of.values())):
             sub = self.space.sub(1 + colour)
@@ -104,8 +85,7 @@ class Solid(Formulation):
     def set_stiff(self) -> None:
         """Set the fields `w` to 0, or in a very thin sheet to a small uniform strain, u = 1e-4 X.
 
-        u is the displacement and X the reference position. The bending stiffness of such a sheet is below round-off;
-        the stress of the strain stiffens it as a membrane.
+        The bending stiffness of such a sheet is below round-off; the stress of the strain stiffens it.
         """
         super().set_stiff()
         if self.volume < _THIN_VOLUME * self.length**self.scene.kinematics.dimension_of_volume:
@@ -122,11 +102,7 @@ class Solid(Formulation):
         return scene.mesh
 
     def mode_space(self) -> fem.FunctionSpace:
-        """Return the space of instability modes on the elements of the fields.
-
-        Returns:
-            Space of displacement amplitudes, shape (3,), and pressures.
-        """
+        """Return the space of instability modes: displacement amplitudes, shape (3,), and pressures."""
         return fem.functionspace(self.domain, basix.ufl.mixed_element(self._elements(self.domain.basix_cell(), 3)[1]))
 
     def _elements(self, cell: Any, components: int = 2) -> tuple[Any, list[Any]]:
@@ -163,38 +139,22 @@ class Solid(Formulation):
 
     def energy_densities(self, names: list[str], F: Any,
                          density: Any = MaterialTerms.step_energy) -> list[tuple[Any, dict]]:
-        r"""Return the energy densities of a body: the material's energy and the terms of incompressibility.
+        r"""Return [(energy per reference volume (UFL, stress), quadrature metadata)] of layers of a body.
 
         .. math::
             W(F) - \sigma_0 \ln J + p (J - 1)
 
         W is the strain energy, J the volume ratio without thermal expansion, p a pressure field, and :math:`\sigma_0`
         the stress dW/dF11 at F = I. A penalty model has a penalty in place of :math:`p (J - 1)`.
-
-        Args:
-            names: layers of the body.
-            F: deformation gradient (UFL, shape (3, 3)).
-            density: function of (terms, F) that returns the energy density of a `MaterialTerms`.
-
-        Returns:
-            List of (energy per reference volume (UFL, stress), quadrature metadata).
         """
         return self.elastic_densities(names, self.elastic(F), ufl.split(self.w)[1:], density)
 
     def elastic_densities(self, names: list[str], F: Any, pressures: Any, density: Any = MaterialTerms.step_energy
                           ) -> list[tuple[Any, dict]]:
-        """Return the terms of the energy density of layers of one material, for an elastic deformation gradient.
+        """Return the terms of the energy density of layers of one material, for an elastic F (UFL, shape (3, 3)).
 
-        The terms are the strain energy and those that make the material incompressible: a pressure field or a penalty.
-
-        Args:
-            names: names of the layers.
-            F: deformation gradient without thermal expansion (UFL, shape (3, 3)).
-            pressures: all pressure fields of the solid, numbered as in `pressure_of` (UFL scalars, dimensionless).
-            density: function of (terms, F) that returns the energy density of a `MaterialTerms`.
-
-        Returns:
-            List of (energy per reference volume (UFL, stress), quadrature metadata).
+        Each is (energy per reference volume (UFL, stress), quadrature metadata): the strain energy, and the pressure
+        field or penalty of incompressibility. pressures: all fields, numbered as in `pressure_of`.
         """
         model, terms, J = self.scene.model, self._terms[names[0]], kin.volume_ratio(F) / self.ratio_before
         W = density(terms, F)

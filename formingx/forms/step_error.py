@@ -48,22 +48,13 @@ class StepError:
                          if entry.has_history and entry.equilibrium_energy(forms.elastic_F) is not None]
 
     def estimate(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
-        """Estimate the time integration error of a step by step doubling.
+        """Estimate the relative error of a step from the last of `past` to x, shape (n,), by step doubling.
 
-        Errors and stresses are root mean squares over the body. Errors are divided by the largest of three stresses: at
-        the start of the step, at its end, and after complete relaxation. Both errors are multiplied by 4 if the body
-        has a material whose errors have the same sign in every step (`Material.motion_variables` or an integral law).
-
-        Args:
-            past: k accepted states, with x and time; the step begins at the last of them.
-            share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,).
-            x: unknowns at the end of the step, locally owned entries, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            Relative error of the stress at the end of the step; the part of it that is left after relaxation at
-            constant deformation for a time of the same length as the step. This second error adds up from step to
-            step. Both are 0 in a step without time.
+        share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,). Return the error
+        of the stress, and its part left after relaxation for another such time, which adds up from step to step. Errors
+        are root mean squares over the body, relative to the largest stress at the start, at the end and after complete
+        relaxation. They are multiplied by 4 for materials whose errors always have the same sign
+        (`Material.motion_variables` or an integral law).
         """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
@@ -100,21 +91,16 @@ class StepError:
         self._forms.clock += time - self._problem.time
 
     def _stresses_at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return the stresses of each material at the end of a step from the current history variables.
+        """Return the stresses of each material at the end of a step, shape (points, 4); x: shape (n,).
 
-        x: unknowns at the end of the step, locally owned entries, shape (n,). time: process time at its end. Each
-        array has the entries 11, 22, sqrt(2) 12, 33 of the deviatoric Kirchhoff stress, shape (points, 4).
+        Entries 11, 22, sqrt(2) 12, 33 of the deviatoric Kirchhoff stress.
         """
         self._set_time(time)
         self._problem.set_fields(x)
         return [stress.values() for stress in self._stresses]
 
     def _stresses_after_relaxation(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return the stresses of each material after relaxation at constant deformation until a time.
-
-        x: unknowns, locally owned entries, shape (n,). Each array has the entries 11, 22, sqrt(2) 12, 33 of the
-        deviatoric Kirchhoff stress, shape (points, 4).
-        """
+        """Return the stresses, as `_stresses_at`, after relaxation at constant deformation until a time."""
         for history in self._materials:
             history.forget_motion()
         return self._stresses_at(x, time)
@@ -158,11 +144,7 @@ class _Stress:
         self._expression = _compat.compile_expression(ufl.as_vector(entries), terms.places)
 
     def values(self) -> np.ndarray:
-        """Return the entries 11, 22, sqrt(2) 12, 33 in the locally owned cells.
-
-        Returns:
-            Stresses, shape (points, 4), stress.
-        """
+        """Return the entries 11, 22, sqrt(2) 12, 33 in the locally owned cells, shape (points, 4), stress."""
         if not len(self._cells):
             return np.zeros((0, 4))
         return self._expression.eval(self._forms.domain, self._cells).reshape(-1, 4)

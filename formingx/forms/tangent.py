@@ -41,10 +41,7 @@ class Tangent:
     def enter(self, active: Any, rate: list[float], changed: bool) -> None:
         """Set the active constraints, and the motion of driven supports, for new step data.
 
-        Args:
-            active: constraints that are active under the step data (`Active`).
-            rate: derivative of each item's amplitude by the control, then of the process time (`StepData.rate`).
-            changed: True if the active constraints differ from the current ones.
+        rate: `StepData.rate`. changed: True if the constraints differ from the current ones.
         """
         if changed:
             self.matrix.constrain(active.bcs, active.rows)
@@ -53,15 +50,9 @@ class Tangent:
             self._lift.x.array[active.dofs] = np.append(rate, 0.0)[active.driver]
 
     def by_control(self, rate: list[float], assemble: Callable[[Any], np.ndarray], n: int) -> np.ndarray:
-        """Return the derivative of the residual with respect to the control, through loads, time and driven supports.
+        """Return dF/dcontrol, shape (n,), through loads, time and driven supports, by rates `StepData.rate`.
 
-        Args:
-            rate: derivative of each item's amplitude by the control, then of the process time (`StepData.rate`).
-            assemble: function that assembles a compiled linear form and returns its locally owned entries.
-            n: number of locally owned field unknowns.
-
-        Returns:
-            dF/dcontrol, shape (n,).
+        `assemble` maps a compiled linear form to its n locally owned entries.
         """
         values = assemble(self._by_load) if self._by_load else np.zeros(n)
         if self._by_time and rate[-1]:

@@ -31,48 +31,19 @@ class Temperature:
         self.limits = (-np.inf, np.inf)
 
     def last_two_states(self, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-        """Return the temperatures in cells, now and in the previous step if there is one.
-
-        Args:
-            cells: local numbers of the cells.
-            places: positions in the reference cell, shape (q, 2).
-
-        Returns:
-            Temperatures, shape (1 or 2, cells, q), cut off at the lowest and highest possible temperature (`limits`).
-        """
+        """Return the temperatures in cells at q places, now and before, shape (1 or 2, cells, q), within `limits`."""
         values = [self.T.x.array] if self.before is None else [self.T.x.array, self.before]
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
 
     def at_points(self, points: np.ndarray) -> np.ndarray:
-        """Return the temperatures at reference points that each rank chooses; collective.
-
-        Args:
-            points: reference positions, shape (n, 2), length.
-
-        Returns:
-            Temperatures, shape (n,), cut off at the lowest and highest possible temperature (`limits`).
-        """
+        """Return the temperatures at points, shape (n, 2), length, of each rank, within `limits`; collective."""
         return np.clip(fields.values_at(self.T, np.asarray(points, dtype=float), self._given.mesh), *self.limits)
 
     def nodes(self, points: np.ndarray) -> np.ndarray:
-        """Return the nodes of the temperature field at given positions in this rank's cells.
-
-        Args:
-            points: reference positions of nodes, shape (..., 2), length.
-
-        Returns:
-            Local numbers of the nodes, shape (...).
-        """
+        """Return the local numbers of nodes at positions in this rank's cells, shape (..., 2), length."""
         from scipy.spatial import cKDTree
         return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :points.shape[-1]]).query(points)[1]
 
     def at_nodes(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the temperatures at nodes of the temperature field.
-
-        Args:
-            nodes: local numbers of the nodes, any shape.
-
-        Returns:
-            Temperatures, the same shape, cut off at the lowest and highest possible temperature (`limits`).
-        """
+        """Return the temperatures at local node numbers of any shape, within `limits`."""
         return np.clip(self.T.x.array[nodes], *self.limits)

@@ -39,25 +39,13 @@ class TemperatureCoefficient:
         self.update(temperatures)
 
     def at_time(self, time: Any) -> Any:
-        """Return the coefficient at a time of the step, extrapolated from the last two accepted states.
-
-        Args:
-            time: process time (UFL scalar).
-
-        Returns:
-            Coefficient (UFL scalar); if temperatures do not change, its value at the beginning of the step.
-        """
+        """Return the coefficient (UFL scalar) at a time, extrapolated from the last two accepted states."""
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 
     def update(self, temperatures: Iterable[np.ndarray]) -> None:
-        """Update the coefficient to changed temperatures.
+        """Update the coefficient to changed temperatures at quadrature points, else raise `InputError`.
 
-        Args:
-            temperatures: for each group of cells (`parts`) the temperatures at its quadrature points, shape (1 or 2,
-                cells, q): at the last accepted state and, if it is known, at the state before.
-
-        Raises:
-            InputError: the function f of a group has no value at a temperature.
+        temperatures: for each of `parts`, now and before, shape (1 or 2, cells, q).
         """
         given = list(temperatures)
         key = self._temperature.time, self._temperature.time_before, *(T.tobytes() for T in given)

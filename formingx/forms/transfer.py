@@ -55,25 +55,11 @@ class MovingLeastSquares:
         self._share = np.linalg.pinv(weight[..., None] * basis, rcond=1e-9)[:, 0] * weight
 
     def fitted(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate values from the source points to the target points; collective.
-
-        Args:
-            values: values at the locally owned source points, shape (m, ...).
-
-        Returns:
-            Values at the locally owned target points, shape (n, ...).
-        """
+        """Interpolate values at owned source points, shape (m, ...), to target points, (n, ...); collective."""
         return np.einsum("nk,nk...->n...", self._share, self.source_values(values)[self._rows])
 
     def source_values(self, values: np.ndarray) -> np.ndarray:
-        """Return the values at the source points of all ranks; collective.
-
-        Args:
-            values: values at the locally owned source points, shape (m, ...).
-
-        Returns:
-            Values rank after rank, which `nearest` indexes, shape (all source points, ...).
-        """
+        """Return the values at the source points of all ranks, as `nearest` counts them; collective."""
         return gathered(self._comm, values)
 
 
@@ -81,11 +67,6 @@ def restrict_fields(source: Any, state: Any, problem: Any) -> None:
     """Set the fields of a problem on part of a mesh from a state on the whole mesh; collective.
 
     The transfer is exact, cell by cell: displacements are quadratic with a bubble, pressures linear.
-
-    Args:
-        source: problem of a solid on the whole mesh.
-        state: state of `source`.
-        problem: problem on the part of the mesh; its `forms.w` is set.
     """
     whole, part = source.forms, problem.forms
     domain = whole.domain
@@ -116,16 +97,7 @@ _PLACES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0], [1 /
 
 
 def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
-    """Evaluate a UFL expression in the locally owned cells.
-
-    Args:
-        domain: DOLFINx mesh.
-        expression: UFL expression with c components.
-        where: positions in the reference cell, shape (q, dimension).
-
-    Returns:
-        Values, shape (cells, q, c).
-    """
+    """Return a UFL expression with c components at q places of owned cells, shape (cells, q, c)."""
     cells = own_cells(domain)
     shape = len(cells), len(where), int(np.prod(expression.ufl_shape, dtype=int))
     found = _compat.compile_expression(expression, where)
@@ -135,8 +107,7 @@ def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
 def _shapes(barycentric: np.ndarray) -> np.ndarray:
     """Return the seven shape functions of a quadratic triangle with a bubble, shape (..., 7).
 
-    Each is 1 at its node and 0 at the others: the corners, the midpoints of the opposite edges, the centroid.
-    barycentric: barycentric coordinates, shape (..., 3).
+    They belong to corners, opposite midpoints and centroid; barycentric: shape (..., 3).
     """
     a, b, c = np.moveaxis(barycentric, -1, 0)
     bubble = 27 * a * b * c
@@ -154,15 +125,8 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
                        moved: bool = False) -> None:
     """Set the history variables of a problem from a state on another mesh of the body; collective.
 
-    History variables of contact are left out if the problems have different numbers of histories, or `moved` is True.
-
-    Args:
-        source: problem on the other mesh.
-        state: state of `source`.
-        problem: problem whose history variables are set.
-        x: unknowns of the same state on the mesh of `problem`, locally owned entries, shape (n,).
-        control: load parameter (control) of the state, dimensionless.
-        moved: True if the mesh of `problem` is a mesh of the deformed body in `state`.
+    x: unknowns on the mesh of `problem`, shape (n,). Those of contact are left out if the numbers of histories differ,
+    or if `moved` is True: the mesh is one of the deformed body.
     """
     problem.set_fields_and_control(x, control)
     with source.state_context(state):
@@ -178,23 +142,14 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
 
 def fitted_tensors(interpolation: MovingLeastSquares, values: np.ndarray, source_F: np.ndarray,
                    target_F: np.ndarray) -> np.ndarray:
-    r"""Interpolate symmetric positive definite tensors C of the reference configuration to other points; collective.
+    r"""Interpolate symmetric positive definite tensors C, entries 11, 22, 12, 33, to other points; collective.
 
-    The interpolated quantity is the logarithm of the tensor relative to the current configuration:
+    The interpolated quantity is the logarithm relative to the current configuration, so stresses stay continuous:
 
     .. math::
         \ln(F^{-T} C F^{-1})
 
-    Stresses are therefore continuous under the transfer, independently of the difference of F on the two meshes.
-
-    Args:
-        interpolation: interpolation from the source to the target points.
-        values: entries 11, 22, 12, 33 of C at the source points, shape (m, 4).
-        source_F: deformation gradients at the source points, shape (m, 3, 3).
-        target_F: deformation gradients at the target points, shape (n, 3, 3).
-
-    Returns:
-        Entries 11, 22, 12, 33 of C at the target points, shape (n, 4).
+    values: shape (m, 4); source_F, target_F: shape (m, 3, 3) and (n, 3, 3). The result has the shape (n, 4).
     """
     seen = np.linalg.solve(np.swapaxes(source_F, 1, 2), _matrices(values))
     w, v = np.linalg.eigh(np.swapaxes(np.linalg.solve(np.swapaxes(source_F, 1, 2), np.swapaxes(seen, 1, 2)), 1, 2))
@@ -212,15 +167,9 @@ def _matrices(entries: np.ndarray) -> np.ndarray:
 
 
 def isochoric_gradients(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Evaluate the isochoric elastic deformation gradient in some cells; collective.
+    """Return F without thermal expansion, scaled to det F = 1, shape (cells q, 3, 3); collective.
 
-    Args:
-        forms: the `Formulation`.
-        cells: local numbers of the cells.
-        places: positions in the reference cell, shape (q, dimension).
-
-    Returns:
-        F without thermal expansion, scaled to det F = 1, shape (cells q, 3, 3).
+    places: positions in the reference cell, shape (q, dimension).
     """
     F = forms.elastic_F
     expression = _compat.compile_expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places)
