@@ -344,10 +344,5 @@ void frame(long m, const double *positions, const long *rows, const double *forc
 
 
 def compiled() -> Any:
-    """Return an object with the compiled C functions; arrays are passed to them by address.
-
-    For m contact points of a `CondensedPoints` object, `forces_at_end` computes contact forces after a motion, `rates`
-    their derivatives with respect to arc length, `change` the first change of a contact status, and `frame` the tool
-    geometry (`ToolFrame`).
-    """
+    """Return an object with the C functions `forces_at_end`, `rates`, `change` and `frame` for m contact points."""
     return functions("reduced_contact", _HEADER, _SOURCE)

@@ -119,14 +119,9 @@ class ContactEventSequence:
         return self._work >= _SETTINGS.max_work
 
     def next(self, k: int, length: float) -> GapClosure | None:
-        """Return the gap closure number k along the path, at which the points of earlier closures carry contact forces.
+        """Return gap closure number k (from 0) on the path, along which points of earlier closures carry forces.
 
-        Args:
-            k: number of the closure, from 0.
-            length: arc length up to which closures are searched.
-
-        Returns:
-            The closure; None if there is none within the arc length, or if the prediction fails.
+        None if there is none within the arc length `length`, or if the prediction fails.
         """
         while len(self._closures) <= k:
             if self.ends < np.inf or self.exhausted:
@@ -143,11 +138,9 @@ class ContactEventSequence:
     def closures(self, length: float) -> tuple[list[np.ndarray], ...]:
         """Return the gap closures within an arc length `length`, as four lists with an array for each face.
 
-        Returns:
-            Arc lengths at which the gaps of locally owned points close, shape (n,); `length` for points without a gap
-            closure. Positions of the points relative to the tool at these arc lengths, shape (n, 2). Mask of the points
-            that carry a predicted contact force at `length`, shape (n,). Derivatives of the positions with respect to
-            arc length just before the gap closure, shape (n, 2); 0 for points without one.
+        Arc lengths at the closures, shape (n,), `length` without one; positions there relative to the tool, shape (n,
+        2); mask of points with a predicted contact force; d(position)/ds just before, shape (n, 2), 0 without a
+        closure.
         """
         piece, points = self._piece(length), self._points
         arc_lengths, positions = np.full(len(piece.positions), length), piece.after(length).positions.copy()
@@ -185,8 +178,8 @@ class ContactEventSequence:
     def _projected(self, piece: PathSegment, moved: np.ndarray | None = None) -> PathSegment:
         """Return a segment at whose start closed points are moved onto their tools or to their sticking positions.
 
-        The points move along the tangents of their tools, so curved tools need several calls. moved: motion of the n
-        points, shape (n, 2), length, that is first added to the start of the segment; None: no motion.
+        They move along the tangents of the tools, so curved tools need several calls. moved: earlier motion of the n
+        points, shape (n, 2), length, or None.
         """
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         u = np.zeros(piece.force.shape) if moved is None else points.values_at(moved)
@@ -293,11 +286,7 @@ class ContactEventSequence:
         return self._end is not None and self._store_first(self._missed(self._end, last), length, last)
 
     def _gap_closures(self, segment: PathSegment, length: float) -> np.ndarray:
-        """Return the arc lengths, from the start of a segment, at which the gaps of the n points close, shape (n,).
-
-        segment: straight segment of the predicted path. length: arc length of the segment, which is also the result for
-        points whose gaps stay open.
-        """
+        """Return the arc lengths from the start of a segment at which gaps close, shape (n,); `length` if open."""
         parts = zip(self._faces, *map(self._points.of_faces, (segment.positions, segment.speed, self._free)))
         return np.concatenate([gap_closures(face.law, x, w, free, length) for face, x, w, free in parts])
 
@@ -439,10 +428,9 @@ class ContactEventSequence:
         return piece._replace(correction=(piece.correction[0] + change[0], piece.correction[1] + change[1]))
 
     def _learn(self, length: float) -> bool:
-        """Compute the compliance of the point that closed last, and of the points that close next before `length`.
+        """Compute and store the compliance of the point that closed last, and of those that close next before `length`.
 
-        length: arc length of the step. The compliance is stored in `_points`. The result is False if the stored LU
-        factors no longer belong to the state.
+        Return False if the stored LU factors no longer belong to the state.
         """
         last, closure, points, chosen = self._pieces[-1], self._closures[-1], self._points, []
         left = length - last.begins

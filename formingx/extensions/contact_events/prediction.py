@@ -35,17 +35,10 @@ class ContactEventPredictor:
         self._limit, self._vectors = limit, list[Any]()
 
     def allowed(self, approach: Approach) -> int:
-        """Return the number of points of a face whose gaps may close in one step.
+        """Return the number of points of a face, on all ranks, whose gaps may close in one step.
 
-        It exceeds `Approach.max_closures` only on faces with stick or friction whose contact has `nodes_per_step=None`.
-        On a moving tool it does so only if points stick on a tool, since long steps of a plug with Coulomb friction may
-        pass a snap.
-
-        Args:
-            approach: the contact of the face.
-
-        Returns:
-            Number of points on all ranks.
+        It exceeds `Approach.max_closures` only with stick or friction and `nodes_per_step=None`. On a moving tool
+        points must stick, since long steps of a plug with Coulomb friction may pass a snap.
         """
         face, most = approach.face, approach.max_closures
         one_by_one = (not self._limit.several_closures or face.contact.nodes_per_step or face.contact.lagged
@@ -56,11 +49,7 @@ class ContactEventPredictor:
 
     @property
     def active(self) -> bool:
-        """True if contact events are predicted for the contacts that are active now.
-
-        At least one contact must allow several gap closures in a step. All contact laws must be predictable
-        (`ContactLaw.predictable`), so that forces follow from distances.
-        """
+        """True if contact events are predicted: a contact allows several closures, all laws are predictable."""
         contacts = self._limit.active_contacts
         return any(self.allowed(c) > c.max_closures for c in contacts) and all(
             c.face.law.predictable for c in contacts)
@@ -68,13 +57,8 @@ class ContactEventPredictor:
     def predict(self, curve: Any, state: Any) -> ContactEventPrediction | None:
         """Return the contact events after an accepted state.
 
-        Args:
-            curve: path solver (`solve.arc_length.Curve`), for the tangent at the state.
-            state: the accepted state.
-
-        Returns:
-            The prediction. None if the predictor is not `active`, if the tangent is singular, or at the start of a path
-            without a closed point.
+        None if the predictor is not `active`, if the tangent is singular, or at the start of a path without a closed
+        point.
         """
         n, contacts = curve.problem.n_owned, self._limit.active_contacts
         if not self.active or state.kind == "start" and not any(
@@ -102,17 +86,11 @@ class ContactEventPrediction:
                                               state.slope, response, max(allowed))
 
     def step_length(self, length: float) -> float | None:
-        """Return the arc length after which the gaps of the admissible number of points of a face have closed.
+        """Return the arc length, at most `length`, after which the gaps of `allowed` points of a face have closed.
 
-        The class has this number, `allowed`. It is 1 on a face of which at most one point is closed at the accepted
-        state. If no contact is without slip, the step ends where a point sticks after it has slipped. In a longer step
-        it would stick where it was at the start. The length is halved while a point would pass through a tool.
-
-        Args:
-            length: largest arc length of the step.
-
-        Returns:
-            Arc length, at most `length`. None if the prediction failed; then the other methods also return None.
+        That is 1 on a face with at most one closed point. If no contact is without slip, the step ends where a point
+        sticks after it has slipped, so that it sticks there. The length is halved while a point would pass through a
+        tool. None if the prediction failed.
         """
         found, sequence = self._length_to_closures(length) if self._known else None, self._sequence
         slides = not any(c.face.contact.sticks for c in self._contacts)
@@ -128,8 +106,8 @@ class ContactEventPrediction:
     def _length_to_closures(self, length: float) -> float | None:
         """Return the arc length, at most `length`, at which the gaps of `allowed` points of a face have closed.
 
-        The prediction assumes that points that stick at the start of the step stay closed. If such a point is in
-        tension at a gap closure, the step ends before this closure. The result is None if the prediction fails.
+        Sticking points are assumed to stay closed. If one is in tension at a gap closure, the step ends before this
+        closure. None if the prediction fails.
         """
         sequence, before, at_start = self._sequence, 0.0, LIMITS.start_fraction * length
         allowed = [most if touching > 1 else 1 for most, touching in zip(self._allowed, sequence.touching)]
@@ -156,8 +134,8 @@ class ContactEventPrediction:
     def _sticking(self) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
         """Sticking points of the accepted state that may open, m on each face, as a tuple for each face.
 
-        Entries are the number of the face; a mask of these points among the n owned points, shape (n,); normal
-        tractions N, shape (m,), stress; positions x, shape (m, 2), length; derivatives dN/dx, shape (m, 2).
+        The face's number; mask, shape (n,); normal tractions N, shape (m,), stress; positions x, shape (m, 2), length;
+        derivatives dN/dx, shape (m, 2).
         """
         found = []
         for f, (approach, x) in enumerate(zip(self._contacts, self._sequence.positions(0.0))):
@@ -179,26 +157,9 @@ class ContactEventPrediction:
         return bool(combined(self._contacts[0].face.comm, tension, MPI.LOR))
 
     def closures(self, length: float) -> list[tuple] | None:
-        """Return the gap closures predicted within a step.
-
-        Args:
-            length: arc length of the step.
-
-        Returns:
-            For each active contact a tuple of arrays for its n owned points: arc length of the gap closure, shape (n,);
-            position there, relative to the tool, shape (n, 2), length; mask of points with a
-            predicted contact force, shape (n,); derivative of the position by arc length just before the closure, shape
-            (n, 2), length. None if the prediction failed.
-        """
+        """Return `ContactEventSequence.closures` as a tuple for each active contact; None if it failed."""
         return list(zip(*self._sequence.closures(length), strict=True)) if self._known else None
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the deviation of the predicted path from the tangent of the state.
-
-        Args:
-            length: arc length along the tangent.
-
-        Returns:
-            Change of x, locally owned entries, shape (n,), and of the control; None if it is zero or unknown.
-        """
+        """Return the predicted path minus the tangent: changes of x, shape (n,), and of the control, or None."""
         return self._sequence.bend(length) if self._known else None

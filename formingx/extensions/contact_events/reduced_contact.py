@@ -113,14 +113,10 @@ class CondensedPoints:
         self._mine, self._rows = self._located([])
 
     def learn(self, chosen: list[np.ndarray], touched: bool = False) -> bool:
-        """Add contact points, and solve for their compliance with the stored LU factors.
+        """Add chosen owned points of each face, and solve for their compliance with the stored LU factors.
 
-        Args:
-            chosen: for each face, local numbers of the locally owned points to add.
-            touched: True if the factorised tangent contains the contact stiffness of these points.
-
-        Returns:
-            False if the stored factors no longer belong to the state, and no point was added; else True.
+        touched: True if the factorised tangent contains their stiffness. Return False if the factors no longer belong
+        to the state; no point is then added.
         """
         found = self._response.to_points(chosen)
         if found is None:
@@ -146,8 +142,8 @@ class CondensedPoints:
     def _properties(self) -> np.ndarray:
         """Properties of the n owned points of all faces that the C function `frame` reads, shape (n, 7).
 
-        The columns are friction, elastic slip, adhesion, force over traction, half-width theta of the ramp, shift of
-        the distance and penalty.
+        They are friction, elastic slip, adhesion, force over traction, theta of the ramp, shift of the distance and
+        penalty.
         """
         found = np.empty((self.starts[-1], 7))
         for face, rows in zip(self._faces, self.of_faces(found)):
@@ -176,11 +172,7 @@ class CondensedPoints:
         return self.starts[closure.face] + closure.point
 
     def values_at(self, values: np.ndarray) -> np.ndarray:
-        """Return values at the m points of the reduced problem, a selection from all ranks, shape (m, ...).
-
-        Args:
-            values: values at the n owned points of all faces, shape (n, ...).
-        """
+        """Return the values at the m points, shape (m, ...), from those at the n owned ones, shape (n, ...)."""
         return self._of_all_ranks(values[self._rows])
 
     def _of_all_ranks(self, own: np.ndarray) -> np.ndarray:
@@ -192,49 +184,29 @@ class CondensedPoints:
         return np.asarray(combined(self._comm, found, MPI.SUM))
 
     def spread(self, values: np.ndarray, among: np.ndarray) -> None:
-        """Write values at the m points, shape (m, ...), into an array of the n owned points of all faces.
-
-        among: this array, shape (n, ...), changed in place at those of the m points that this rank owns.
-        """
+        """Write values at the m points, shape (m, ...), into an array of the n owned points, in place."""
         among[self._rows] = values[self._mine]
 
     def _located(self, point_ids: Sequence[tuple[int, int, int]]) -> tuple[Any, np.ndarray]:
-        """Return the indices in `point_ids` of the k points that this rank owns, and their numbers.
+        """Return the indices of the k owned points in `point_ids`, (rank, face, point) each, and their numbers.
 
-        point_ids: (rank, face, point) of each point. The indices are a slice or an array, shape (k,). The numbers count
-        the owned points of all faces, shape (k,).
+        Indices: a slice or shape (k,). Numbers among owned points: shape (k,).
         """
         ids = np.array(point_ids, dtype=int).reshape(-1, 3)
         mine = slice(None) if self._comm.size == 1 else np.flatnonzero(ids[:, 0] == self._comm.rank)
         return mine, np.array(self.starts)[ids[mine, 1]] + ids[mine, 2]
 
     def motion_to_targets(self, positions: np.ndarray, place: np.ndarray, near: ToolFrame) -> np.ndarray:
-        """Return the motion that takes the m points (`point_ids`) to their target positions.
-
-        The tangential motion leads to `place`. The normal motion leads to the depth at which the contact law gives the
-        current force.
-
-        Args:
-            positions: positions of the n owned contact points relative to their tools, shape (n, 2), length.
-            place: target positions of the m points along their tools, shape (m, 2), length.
-            near: geometry of the tools at the m points; its `beyond` is the normal motion.
-
-        Returns:
-            Motion, shape (m, 2), length.
-        """
+        """Return the motion of the m points to `place` along, and to the depth of their force normal to, the tools.
+        positions: of the n points. place and result: shape (m, 2), length."""
         along = np.einsum("ni,ni->n", near.tangent, place - self.values_at(positions))
         return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
 
     def tool_frame(self, positions: np.ndarray, force: np.ndarray) -> ToolFrame:
-        """Return the geometry of the tools at the m points (`point_ids`).
+        """Return normals, tangents, curvatures and `beyond` of the tools at the m points (`point_ids`).
 
-        Args:
-            positions: positions of the n owned contact points relative to their tools, shape (n, 2), length.
-            force: contact forces at the m points, with the sign and scale of the residual F, shape (m, 2).
-
-        Returns:
-            Normals, tangents and curvatures of the tools. `beyond` is the depth at which the contact law gives the
-            force of a point, minus the depth of the point.
+        positions: of the n owned points relative to their tools, shape (n, 2), length. force: contact forces, shape (m,
+        2). `beyond` is the depth that gives the force of a point, minus its depth.
         """
         k, own = len(self._rows), force[self._mine]
         if self._profiles is None:
@@ -248,11 +220,9 @@ class CondensedPoints:
 
     @cached_property
     def _profiles(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Profiles of all tools, or None if a contact law does not use the profile of its tool.
+        """Profiles of all tools, shape (pieces, 9), as `formingx.tools.nearest.nearest` takes them; None if not used.
 
-        The first array has a row for each line and arc, shape (pieces, 9), as `formingx.tools.nearest.nearest` takes
-        them. The second has the row of the first piece of the tool of each of the n owned points, the number of pieces
-        and the number of lines, shape (n, 3).
+        The second array, shape (n, 3), has the first piece of each point's tool and its numbers of pieces and of lines.
         """
         tools = [face.law.profile for face in self._faces]
         if None in tools:
@@ -265,8 +235,8 @@ class CondensedPoints:
     def _frame_by_arrays(self, positions: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return the tool geometry at the k owned ones of the m points as the C function `frame` does, for any tools.
 
-        positions: of the n owned points of all faces, shape (n, 2), length. force: at the k points, shape (k, 2). The
-        result, shape (6 k,), has normals (k, 2), tangents (k, 2), curvatures (k,) and `ToolFrame.beyond` (k,), flat.
+        positions: shape (n, 2), length. force: shape (k, 2). The result, shape (6 k,), has normals (k, 2), tangents (k,
+        2), curvatures (k,) and `ToolFrame.beyond` (k,), flat.
         """
         found = np.zeros((6, len(self._rows)))
         for face, first, end in zip(self._faces, self.starts, self.starts[1:]):
@@ -280,46 +250,19 @@ class CondensedPoints:
         return np.concatenate([found[:2].T.ravel(), found[2:4].T.ravel(), *found[4:]])
 
     def parts(self, force: np.ndarray, near: ToolFrame) -> tuple[np.ndarray, np.ndarray]:
-        """Return the components of vectors normal and tangential to the tools.
-
-        Args:
-            force: vectors at the m points (forces, their rates or motions), shape (m, 2).
-            near: geometry of the tools.
-
-        Returns:
-            Normal and tangential components, N and T for forces, shape (m,) each.
-        """
+        """Return the components of vectors, shape (m, 2), normal and tangential to the tools, shape (m,) each."""
         return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
 
     def motion_under(self, forces: np.ndarray) -> np.ndarray:
-        """Return the motion of the n owned points of all faces under contact forces at the m points (`point_ids`).
-
-        Args:
-            forces: contact forces, subtracted from the residual F, shape (m, 2).
-
-        Returns:
-            Motion relative to the tools, shape (n, 2), length.
-        """
+        """Return the motion, shape (n, 2), length, of the n owned points under forces, shape (m, 2)."""
         return self.motions @ forces.ravel()
 
     def forces_at_end(self, u: np.ndarray, status: np.ndarray, near: ToolFrame, force: np.ndarray,
                       to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Compute the contact forces F at the end of a given motion, for given contact statuses.
+        """Compute the contact forces F after a motion u of the m points at constant forces, and F - `force` - S dx.
 
-        Args:
-            u: motion of the points if the contact forces did not change, shape (m, 2), length.
-            status: contact statuses, shape (m,): -1 or 1 for sliding against or along the tangent of the tool, 0
-                sticking, 2 open (`ContactStatus`).
-            near: geometry of the tools at the m points.
-            force: contact forces before the motion, shape (m, 2).
-            to: motion of sticking points to the positions at which their tangential force is 0, and of sliding points
-                to the surface of their tools, shape (m, 2), length. The elastic slip g_s T/(mu N) of a sticking point
-                is added, with `elastic_slip` g_s, tangential and normal force T and N, and friction mu.
-
-        Returns:
-            New forces F, and their change without the part in the factorised tangent, F - `force` - S dx, shape (m, 2)
-            each. S is the contact stiffness of the points in that tangent, dx their motion. If no such forces exist,
-            the first array is `force`, and the second is NaN.
+        S: stiffness in the factorised tangent; `to`: motion to zero tangential force (sticking) or onto the tool
+        (sliding). All shapes (m, 2), length for motions; status (`ContactStatus`): (m,). Without F: `force` and NaN.
         """
         F, outside = np.empty(force.shape), np.empty(force.shape)
         good = compiled().forces_at_end(
@@ -329,21 +272,10 @@ class CondensedPoints:
 
     def rates(self, u: np.ndarray, status: np.ndarray, near: ToolFrame,
               force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray] | None:
-        """Compute the rates of the contact forces along the path, with contact statuses that satisfy Coulomb's law.
+        """Compute the rates F of the contact forces along the path, with statuses that satisfy Coulomb's law.
 
-        Statuses that violate the law are changed by an active-set search.
-
-        Args:
-            u: velocity of the points along the tangent of the path, shape (m, 2), length per arc length.
-            status: statuses with which the search begins, shape (m,): -1 or 1 for sliding against or along the tangent
-                of the tool, 0 sticking, 2 open (`ContactStatus`).
-            near: geometry of the tools at the m points.
-            force: current contact forces, shape (m, 2).
-
-        Returns:
-            Rates F of the forces, shape (m, 2). Rates without the part in the factorised tangent, F - S v, shape (m,
-            2): S is the contact stiffness of the points in that tangent, v their velocity. Statuses, shape (m,). None
-            if no admissible statuses were found.
+        Return F, F - S v, shape (m, 2) each, and statuses, shape (m,), found by an active-set search from `status`;
+        else None. u: velocities by arc length, shape (m, 2). S v: part in the factorised tangent. force: shape (m, 2).
         """
         slack = (status != ContactStatus.FREE) & ~self._pulls
         F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]
@@ -356,18 +288,9 @@ class CondensedPoints:
 
     def change(self, status: np.ndarray, near: ToolFrame, force: np.ndarray, rate: np.ndarray) -> tuple[float,
                                                                                                         np.ndarray]:
-        """Return the arc length after which a contact status changes first, with forces linear in the arc length.
+        """Return the arc length at which a point first opens or begins to slide, and the statuses, shape (m,), then.
 
-        Args:
-            status: contact statuses, shape (m,): -1 or 1 for sliding against or along the tangent of the tool, 0
-                sticking, 2 open (`ContactStatus`).
-            near: geometry of the tools at the m points.
-            force: current contact forces, shape (m, 2).
-            rate: derivatives of the forces with respect to arc length, shape (m, 2).
-
-        Returns:
-            Arc length until the first point opens or begins to slide, infinite if none does; statuses after this
-            change.
+        Forces, shape (m, 2), change linearly by `rate`; infinite without a change. status: `ContactStatus`, shape (m,).
         """
         changed, after = np.zeros(2, dtype=int), np.array(status, dtype=int)
         s = compiled().change(*self._arguments(near), address_of_integers(status), address(force), address(rate),
@@ -377,11 +300,7 @@ class CondensedPoints:
         return s, after
 
     def _arguments(self, near: ToolFrame) -> tuple:
-        """Return the arguments of the C functions that describe the m points and their tools.
-
-        They are m, and addresses of friction, adhesion, stiffness S, compliance C, normals and curvatures. near: tool
-        geometry at the m points.
-        """
+        """Return m and addresses of friction, adhesion, S, C, normals and curvatures for the C functions."""
         return (len(self.friction), address(self.friction), address(self._pulls), address(self._S), address(self._C),
                 address(near.normal), address(near.curvature))
 

@@ -43,31 +43,14 @@ class BodyResponse:
         return self._made == self._newton.solver.count
 
     def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
-        """Return the response to unit forces at contact points, one for each component of each point.
-
-        Each force contributes -1 to one component of the residual F at its point.
-
-        Args:
-            chosen: for each face, local numbers of locally owned points.
-
-        Returns:
-            Changes of x, locally owned rows, shape (n, m), and of the control, shape (m,). The m columns run over the
-            points of all ranks and their components. None if the stored LU factors belong to another tangent.
-        """
+        """Return dx, shape (n, m), dcontrol, (m,), by forces -1 at chosen owned points; None if K changed."""
         return self._solve(unit_forces(self._problem, self._problem.active_contacts, chosen)) if self.is_valid else None
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
-        """Return one modified Newton correction of (x, control) towards equilibrium with given contact forces.
+        """Return one modified Newton correction of (x, control), x of shape (n,), with given contact forces.
 
-        Args:
-            x: unknowns at the current iterate, locally owned entries, shape (n,).
-            control: load parameter (control) of the current iterate, dimensionless.
-            forces: for each face, dimensionless contact forces at its points, added to the residual F, shape (n, 2).
-                At points with NaN the force follows from the contact law.
-
-        Returns:
-            Changes of x, locally owned entries, shape (n,), and of the control. None if the result is not finite, or
-            if the stored LU factors belong to another tangent.
+        forces: for each face, dimensionless, added to the residual F, shape (n, 2); at NaN the law gives the force.
+        None if the result is not finite, or if the stored LU factors belong to another tangent.
         """
         if not self.is_valid:
             return None
@@ -85,10 +68,9 @@ class BodyResponse:
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
 
     def _solve(self, E: Array) -> tuple[Array, Array] | None:
-        """Return the responses of x, shape (n, m), and of the control, shape (m,), to changes E of the residual.
+        """Return dx, shape (n, m), and dcontrol, shape (m,), by changes E of the residual, owned rows, shape (n, m).
 
-        E: m right-hand sides of the system with the tangent K, locally owned rows, as columns, shape (n, m). The result
-        is None if K with the changed stiffness of a few contact points is singular.
+        None if K with the changed stiffness of a few contact points is singular.
         """
         V = self._newton.solve_one_sided(E)
         if V is None:
