@@ -14,11 +14,7 @@ STEFAN_BOLTZMANN = 5.670374419e-8
 
 
 def is_implausible(biot_number: float) -> bool:
-    """Return True for a finite Biot number above 1e4, that of 1e6 W/(m2 K) and 2 mm of a polymer.
-
-    Args:
-        biot_number: heat transfer coefficient times thickness over conductivity.
-    """
+    """Return True for a finite Biot number above 1e4, that of 1e6 W/(m2 K) and 2 mm of a polymer."""
     return 1e4 < biot_number < float("inf")
 
 

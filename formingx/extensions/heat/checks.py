@@ -43,49 +43,25 @@ def error_of_layers(layers: float, biot: float) -> float:
     The constants are fitted to computed errors at the time 0.01 h^2/a, with the thickness h of the sheet and its
     diffusivity a.
 
-    Args:
-        layers: number n of layers: thickness of the sheet over the thickness of the elements at the face.
-        biot: Biot number Bi: conductance of the face times thickness of the sheet over conductivity.
-
-    Returns:
-        Error e over the difference between the highest and the lowest temperature.
+    Biot number Bi: conductance of the face times thickness over conductivity. The error is relative to the span of
+    temperatures.
     """
     return _ERROR_OF_ONE_LAYER * _biot_factor(biot) * layers ** -_LAYER_ORDER
 
 
 def layers_needed(biot: float) -> int:
-    """Return the number of equal layers of elements that resolve a sudden cooling of one face of a sheet.
-
-    The largest error of the temperature is then at most 1 % of the difference between the highest and the lowest
-    temperature (`error_of_layers`).
-
-    Args:
-        biot: Biot number: conductance of the chilled face times thickness of the sheet over conductivity.
-
-    Returns:
-        Number of layers through the thickness.
-    """
+    """Return the number of equal layers that keep `error_of_layers` below 1 % after sudden cooling of a face."""
     return max(1, int(np.ceil((_ERROR_OF_ONE_LAYER * _biot_factor(biot) / MEASURED_ACCURACY) ** (1 / _LAYER_ORDER))))
 
 
 def _biot_factor(biot: float) -> float:
-    """Return the temperature error of coarse layers at a Biot number over the error at an infinite Biot number.
-
-    biot: conductance of the chilled face times thickness of the sheet over conductivity.
-    """
+    """Return the error of coarse layers at a Biot number over the error at an infinite one, dimensionless."""
     return 1.0 if np.isinf(biot) else biot / (biot + _HALF_ERROR_BIOT)
 
 
 @register("scene")
 def coarse_layers(body: Any) -> Iterator[Finding]:
-    """Find chilled faces of a sheet with too few layers of elements below them; collective.
-
-    Args:
-        body: the examined body (`formingx.checks.sizes.SizedBody`), with its `scene` and the `thickness` of the sheet.
-
-    Yields:
-        A warning for the face with the largest error.
-    """
+    """Yield a warning for the chilled face with the largest error of too few layers below it; collective."""
     scene = body.scene
     if scene.heat is None:
         return
@@ -111,17 +87,10 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 
 @register("scene")
 def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
-    """Find equilibrium moduli that increase on cooling: the stress of the stretched part then increases, too.
+    """Yield a warning for each constant that is more than twice as large at the lowest temperature as at the highest.
 
-    Such a part springs back, while a part that solidifies keeps its shape. For example, a film whose equilibrium
-    modulus was a table of the temperature separated from its mould, and shrank to a third of its height.
-
-    Args:
-        body: the examined body, with its `scene`.
-
-    Yields:
-        A warning for each material constant that is more than twice as large at the lowest temperature as at the
-        highest.
+    The stress of the stretched part then increases on cooling. Such a part springs back, while a part that solidifies
+    keeps its shape.
     """
     scene = body.scene
     if scene.heat is None:
@@ -148,16 +117,9 @@ def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def implausible_units(body: Any) -> Iterator[Finding]:
-    """Find temperatures, conductances and diffusivities that no polymer process has, as in mixed units; collective.
+    """Yield warnings for temperatures, conductances and diffusivities that no polymer process has; collective.
 
-    A body has from 200 to 680 K, and its surroundings at least 200 K. The Biot number is at most 1e4: a contact of 1e6
-    W/(m2 K) with 2 mm of a polymer. For the diffusivity see `implausible_diffusivities`.
-
-    Args:
-        body: the examined body, with its `scene` and its `thickness`.
-
-    Yields:
-        A warning for each implausible quantity.
+    A body has from 200 to 680 K, its surroundings at least 200 K, and the Biot number is at most 1e4.
     """
     scene = body.scene
     if scene.heat is None:
@@ -184,14 +146,7 @@ def implausible_units(body: Any) -> Iterator[Finding]:
 
 @register("scene")
 def unused_temperature(body: Any) -> Iterator[Finding]:
-    """Find a temperature on which nothing in the scene depends.
-
-    Args:
-        body: the examined body, with its `scene`.
-
-    Yields:
-        A warning if there is such a temperature.
-    """
+    """Yield a warning if nothing in the scene depends on its temperature."""
     scene = body.scene
     constants = [value for material in scene.materials.values() for value in material.constants().values()]
     if not (scene.temperature is None or scene.heat is not None or scene.expansion
@@ -203,14 +158,7 @@ def unused_temperature(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def implausible_expansion(body: Any) -> Iterator[Finding]:
-    """Find lengths that change by more than 20 % between the stress-free temperature and a temperature of the body.
-
-    Args:
-        body: the examined body, with its `scene`.
-
-    Yields:
-        A warning for each layer with such a change.
-    """
+    """Yield a warning for each layer whose lengths change by more than 20 % from the stress-free temperature."""
     scene = body.scene
     if not scene.expansion:
         return
@@ -229,14 +177,7 @@ def implausible_expansion(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def heat_without_time(body: Any) -> Iterator[Finding]:
-    """Report a run in which no stage takes time, so that no heat is conducted.
-
-    Args:
-        body: the examined body, with its `scene` and the `stages` of the process.
-
-    Yields:
-        A warning, if there is a `Cooling`.
-    """
+    """Yield a warning if a `Cooling` has no stage that takes time."""
     if body.scene.heat is not None and body.has_targets and not any(stage.timed for stage in body.stages):
         yield Finding("warning", "heat", "the run takes no time, so that no heat is conducted: give stages of a Process"
                       " a speed, a duration or a table over time")
@@ -244,16 +185,7 @@ def heat_without_time(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def beyond_known_range(body: Any) -> Iterator[Finding]:
-    """Find constants whose given range of temperatures is smaller than the range that the body may reach; collective.
-
-    Initial temperature, tools, air and heaters bound the temperatures that the body may reach.
-
-    Args:
-        body: the examined body, with its `scene`.
-
-    Yields:
-        A warning for each constant and each end of its range that the temperature of the body may pass.
-    """
+    """Yield warnings for constants whose range is below that of initial body, tools, air and heaters; collective."""
     if body.scene.heat is not None:
         low, high = body.scene.heat.extremes(body.scene)
         yield from _outside_known_range(body.scene, low, high, "the tools and the air may bring it")
@@ -261,15 +193,9 @@ def beyond_known_range(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def passed_known_range(path: Any) -> Iterator[Finding]:
-    """Find constants whose given range of temperatures is smaller than the range of the body in a run; collective.
+    """Yield a warning for each end of a constant's range that the temperature of the body passed; collective.
 
     Constants about which a check warned before the run are left out.
-
-    Args:
-        path: the computed `Path`.
-
-    Yields:
-        A warning for each constant and each end of its range that the temperature of the body passed.
     """
     reported = {finding.about for finding in path.record.findings}
     states = path.segments[-1].states
@@ -285,11 +211,7 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
 def _outside_known_range(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
     """Yield warnings for constants of materials, friction and expansion that are unknown at `low` or at `high`.
 
-    Args:
-        scene: the `Scene`.
-        low: lowest temperature of the body.
-        high: highest temperature of the body.
-        cause: subject and verb of the message, such as "the run brought it".
+    `cause` is subject and verb of the message, such as "the run brought it".
     """
     laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
             for name, value in material.constants().items()]
@@ -312,14 +234,7 @@ def _outside_known_range(scene: Any, low: float, high: float, cause: str) -> Ite
 
 @register("end")
 def temperature_errors(path: Any) -> Iterator[Finding]:
-    """Find a discretisation error of the temperature above its tolerance, in the states on the last mesh; collective.
-
-    Args:
-        path: the computed `Path`.
-
-    Yields:
-        A warning if the mesh is too coarse.
-    """
+    """Yield a warning if the mesh is too coarse for the temperature, in states on the last mesh; collective."""
     for history in path.problem.histories:
         if isinstance(history, CoolingHistory):
             yield from history.findings(path.segments[-1].states)

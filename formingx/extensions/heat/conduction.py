@@ -46,15 +46,6 @@ class Conduction(HeatVectors):
     at m nodes along the depth below each contact node, the face first. Entries of M and R of the body are divided by
     `capacity`: M sums to 1, and R is in degrees per time.
 
-    Args:
-        mesh: the `Mesh`.
-        materials: {layer: `ThermalProperties`}.
-        boundaries: laws of the faces and heat sources.
-        kinematics: the `Kinematics`.
-        absolute_zero: absolute zero in the unit of temperatures.
-        displacement: displacement of the body (UFL), length; None: the reference configuration.
-        degree: polynomial degree of the temperature in an element.
-
     Attributes:
         mesh: the `Mesh`.
         comm: MPI communicator.
@@ -101,23 +92,11 @@ class Conduction(HeatVectors):
         self.update()
 
     def start(self) -> list[np.ndarray]:
-        """Return the initial temperatures of body and tools; faces with `FixedTemperature` have their prescribed value.
-
-        Returns:
-            List of arrays. The first has the temperatures of the body, from `T`, shape (n,). One follows for each tool
-            in contact: its excess temperatures over its back, at m nodes along the depth, shape (contact nodes, m).
-        """
+        """Return the initial temperatures of body and tools; `FixedTemperature` faces have theirs."""
         return [self.with_fixed_values(self.T.x.array[: self._n]), *(touch.start() for touch in self.tool_contacts)]
 
     def with_fixed_values(self, T: np.ndarray) -> np.ndarray:
-        """Return nodal temperatures in which nodes on faces of prescribed temperature have the prescribed values.
-
-        Args:
-            T: temperatures, locally owned entries, shape (n,).
-
-        Returns:
-            Temperatures, shape (n,).
-        """
+        """Return temperatures, shape (n,), with the prescribed values at nodes of `FixedTemperature` faces."""
         return np.where(self._fixed_mask, self._fixed_values.x.array[: self._n], T)
 
     def update(self) -> None:
@@ -131,16 +110,9 @@ class Conduction(HeatVectors):
             depth.x.scatter_forward()
 
     def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
-        """Return the rates of heat of body and tools at given temperatures.
+        """Return the rates of heat M dT/dt, with the shapes of `state`, and the heat per time of faces and sources.
 
-        Args:
-            state: temperatures of the body, shape (n,). Then for each tool in contact its excess temperatures over its
-                back, at m nodes along the depth, shape (contact nodes, m).
-
-        Returns:
-            Rates of heat M dT/dt with the capacity matrix M, a list of arrays with the shapes of `state`. For the body
-            they are divided by its heat capacity, degrees per time; for the tools they are per contact area. Then the
-            heat per time into the whole body through each boundary and from each source, as `ImplicitStage.heats`.
+        Rates of the body are over its heat capacity, degrees per time; those of tools per contact area.
         """
         R = self._body_rate(state[0])
         found, through = [R], []
@@ -158,19 +130,8 @@ class Conduction(HeatVectors):
 
         M is the capacity matrix, R the rate of heat, Delta the change of the temperatures y.
 
-        Args:
-            state: temperatures y of the body at the start of the step, shape (n,). Then for each tool in contact its
-                excess temperatures over its back, at m nodes along the depth, shape (contact nodes, m).
-            known: heats k from earlier stages: of the body over its heat capacity, degrees, shape (n,); of each tool in
-                contact per contact area, shape (contact nodes, m).
-            c: factor c of the rates of heat in the stage, time.
-            guess: initial guess of the change of the temperatures of the body, locally owned entries, shape (n,).
-
-        Returns:
-            The changes, rates and heats.
-
-        Raises:
-            ConvergenceError: Newton's method found no solution.
+        `state` and `known` (k) are temperature states, see the class. The guess of the change of the body has shape
+        (n,), degrees. Without a solution, ConvergenceError is raised.
         """
         T = state[0]
         responses = [touch.response(excess, k, c) for touch, excess, k in zip(self.tool_contacts, state[1:], known[1:])]
@@ -199,13 +160,8 @@ class Conduction(HeatVectors):
         M is the capacity matrix, R' the derivative of the rate of heat, Delta the change of temperature. The factorised
         matrix of the last `stage` is reused if it had the same c; otherwise it is assembled at the last temperature.
 
-        Args:
-            known: heats k of the body over its heat capacity, degrees, shape (n,). Then of each tool in contact per
-                contact area, at m nodes along the depth, shape (contact nodes, m).
-            c: factor c of the rates of heat in the step, time.
-
-        Returns:
-            Largest absolute change of body and tools over all ranks, degrees. Change of the body, shape (n,), degrees.
+        k is a temperature state of heats. The results are the largest absolute change on all ranks and the change of
+        the body, shape (n,), degrees.
         """
         responses = [touch.response(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
         self._factorise(c, responses, afresh=False)
@@ -219,30 +175,12 @@ class Conduction(HeatVectors):
         return max(sizes), change
 
     def slope(self, rate: np.ndarray) -> np.ndarray:
-        """Return dT/dt of the body from its rates of heat M dT/dt, with the capacity matrix M.
-
-        Args:
-            rate: rates of heat over `capacity`, locally owned entries, shape (n,), degrees per time.
-
-        Returns:
-            dT/dt, shape (n,), degrees per time; 0 where the temperature is prescribed.
-        """
+        """Return dT/dt, shape (n,), from rates M dT/dt over `capacity`, degrees per time; 0 at prescribed nodes."""
         self._factorise(0.0, [], afresh=True)
         return self._solve(rate)
 
     def heat_through_fixed_faces(self, missing: np.ndarray) -> np.ndarray:
-        """Return the heat that enters the body in a step through each face of prescribed temperature.
-
-        A node on such a face stores more heat in the step than conduction, laws of other faces and sources supply. The
-        missing heat enters through the face.
-
-        Args:
-            missing: missing heat of each node, divided by the heat capacity of the body (`capacity`), degrees, locally
-                owned entries, shape (n,).
-
-        Returns:
-            Heat through each face, shape (faces,), summed over ranks. These faces are the last entries of `names`.
-        """
+        """Return the heat through each prescribed face, shape (faces,), from the missing heat of nodes, shape (n,)."""
         return self.capacity * np.array([self._sum(missing[dofs]) for _, dofs in self._fixed])
 
     def destroy(self) -> None:
@@ -252,15 +190,9 @@ class Conduction(HeatVectors):
 
     def _end_of_stage(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
                 responses: list[Any]) -> ImplicitStage:
-        """Return changes, rates and heats of an implicit stage that has converged.
+        """Return changes, rates and heats of a converged implicit stage.
 
-        Args:
-            T: temperatures of the body at the start of the step, shape (n,).
-            change: change of these temperatures in the stage, shape (n,).
-            known: heats of the body from earlier stages, over its heat capacity, degrees, shape (n,). Then of each tool
-                in contact per contact area, at m nodes along the depth, shape (contact nodes, m).
-            c: factor of the rates of heat in the stage, time.
-            responses: `ToolResponse` of each tool in contact.
+        T and its change have shape (n,), degrees; `known` is a temperature state of heats; c is in units of time.
         """
         R = self._body_rate(T + change)
         changes, rates, through = [change], [R], []
@@ -273,12 +205,7 @@ class Conduction(HeatVectors):
         return ImplicitStage(changes, rates, self._heats(through))
 
     def _heats(self, tool_heats: list[float]) -> np.ndarray:
-        """Return the heat per time into the whole body at the temperature `T`, summed over ranks, shape (k,).
-
-        The k entries belong to the laws of faces, then the heat sources, then the contacts with tools.
-
-        tool_heats: heat per time into the body through each contact with a tool on this rank, divided by the heat
-        capacity of the body (`capacity`), degrees per time.
+        """Return the heat per time into the body from faces, sources and tools at `T`, summed over ranks, shape (k,).
         """
         local = [fem.assemble_scalar(form) for form in self._scalars] + tool_heats
         return self.capacity * self.comm.allreduce(np.array(local, dtype=float), MPI.SUM)
@@ -313,15 +240,7 @@ class Conduction(HeatVectors):
         return [(m, self._dx if everywhere else self._dx(tuple(tags))) for m, tags in groups.values()]
 
     def _stored(self, materials: Mapping[str, ThermalProperties], T: Any, v: Any) -> Any:
-        """Return the form of the heat density at a temperature times a test function, multiplied by `_scale`.
-
-        `_scale` is 1 until `capacity`, the heat capacity of the whole body, is known, and then 1 over `capacity`.
-
-        Args:
-            materials: {layer: `ThermalProperties`}.
-            T: temperature (UFL scalar).
-            v: test function (UFL scalar).
-        """
+        """Return the form of the heat density at T times the test function v, times `_scale` (1 or 1 / `capacity`)."""
         return sum(self._scale * self.constant(m.density * m.heat_capacity) * T * v * self._weight * dx
                    for m, dx in self._layer_measures(materials))
 
@@ -387,11 +306,7 @@ class Conduction(HeatVectors):
         return HeatContact(contact, own, self.points[own])
 
     def displacements(self) -> Any:
-        """Return the displacements of the locally owned nodes.
-
-        Returns:
-            Displacements, shape (n, 2), length; None for a body without displacement.
-        """
+        """Return the displacements of the locally owned nodes, shape (n, 2), length; None without displacement."""
         if self._u is None:
             return None
         if self._displaced is None:
@@ -422,10 +337,7 @@ class Conduction(HeatVectors):
     def _factorise(self, c: float, responses: list[Any], afresh: bool) -> None:
         """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of rates of heat at the last `T`.
 
-        Args:
-            c: factor of the rates of heat in the stage, time.
-            responses: `ToolResponse` of each tool in contact, whose conductance adds to the diagonal.
-            afresh: True to factorise in any case; False to keep the last factors if they have the same c.
+        Tools add their conductance to the diagonal. Factors of the same c are reused unless `afresh`.
         """
         if self._factored_for == c and not afresh:
             return

@@ -154,11 +154,6 @@ class HeatContact:
     before its back. Their excess temperatures over the back are differences to its temperature, shape (n, m). A tool of
     prescribed temperature has m = 0.
 
-    Args:
-        contact: the `ContactWithTool`.
-        dofs: local numbers of the nodes, shape (n,).
-        points: reference positions of the nodes, shape (n, 2), length.
-
     Attributes:
         on: name of the boundary.
         dofs: local numbers of the nodes, shape (n,).
@@ -189,36 +184,15 @@ class HeatContact:
         return len(self._M) > 0
 
     def start(self) -> np.ndarray:
-        """Return the initial excess temperatures of the tool: its temperatures minus the temperature of its back.
-
-        Returns:
-            Excess temperatures at the m nodes along the depth below each of the n contact nodes, shape (n, m), degrees.
-        """
+        """Return the initial excess temperatures of the tool over its back, shape (n, m), degrees."""
         return np.full((len(self.dofs), len(self._M)), self._initial_excess)
 
     def face(self, excess: np.ndarray) -> np.ndarray:
-        """Return the temperature of the face of the tool at each of the n contact nodes.
-
-        Args:
-            excess: excess temperatures of the tool over its back, at the m nodes along the depth below each contact
-                node, the face first, shape (n, m), degrees.
-
-        Returns:
-            Temperatures, shape (n,).
-        """
+        """Return the temperature of the face of the tool, shape (n,), from excess temperatures, shape (n, m)."""
         return self.back + excess[:, 0] if self.conducts else np.full(len(self.dofs), self.back)
 
     def rates(self, excess: np.ndarray, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the flux into the body and the rates of heat in the tool.
-
-        Args:
-            excess: excess temperatures w of the tool over its back, at the m nodes along the depth below each of the n
-                contact nodes, shape (n, m), degrees. The face comes first.
-            T: temperatures of the body at the contact nodes, shape (n,).
-
-        Returns:
-            Flux q into the body, heat per time and area, shape (n,). Rates of heat M dw/dt at the nodes of the tool per
-            contact area, with the capacity matrix M along the depth, shape (n, m).
+        """Return the flux into the body, shape (n,), and the rates of heat in the tool per contact area, shape (n, m).
         """
         q = self.conductance * (self.face(excess) - T)
         rate = -excess @ self._K
@@ -233,15 +207,8 @@ class HeatContact:
         M and K are the capacity and conductivity matrices along the depth of the tool, and Delta is the change of its
         excess temperatures w. The vector e_1 is 1 at the node on the face of the tool, else 0.
 
-        Args:
-            excess: excess temperatures w of the tool over its back, at the m nodes along the depth below each of the n
-                contact nodes, shape (n, m), degrees. The face comes first.
-            known: heats k per contact area at the nodes of the tool, from earlier stages of the step, shape (n, m).
-            c: factor c of the rates of heat in the stage, time.
-            absolute: False if the temperatures of body and tool are differences of two states; the back then has 0.
-
-        Returns:
-            The response.
+        Excess temperatures and known heats k per contact area have shape (n, m). With `absolute` False, temperatures
+        are differences of two states, and the back has 0.
         """
         back = self.back if absolute else 0.0
         if not self.conducts:
@@ -253,32 +220,12 @@ class HeatContact:
 
     def flux_and_change(self, response: ToolResponse, known: np.ndarray, T: np.ndarray,
                         c: float) -> tuple[Any, Any, Any]:
-        """Return the flux, and the changes and rates in the tool, at the end of an implicit stage of a time step.
-
-        The tool has m nodes along its depth below each of the n contact nodes.
-
-        Args:
-            response: result of `response`.
-            known: heats per contact area at the nodes of the tool, from earlier stages of the step, shape (n, m).
-            T: temperatures of the body at the contact nodes, shape (n,).
-            c: factor of the rates of heat in the stage, time.
-
-        Returns:
-            Flux q into the body, heat per time and area, shape (n,). Changes of temperature in the tool, degrees, shape
-            (n, m). Rates of heat at the nodes of the tool per contact area, shape (n, m).
-        """
+        """Return flux, shape (n,), temperature changes and rates in the tool, both (n, m), after an implicit stage."""
         q = response.conductance * (response.face_temperature - T)
         change = response.change - np.outer(q, response.compliance)
         return q, change, (change @ self._M - known) / c
 
     def _factorise(self, c: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return (M + c K)^-1, and its first column times c: the decrease of temperatures by a unit flux at the face.
-
-        M and K are the capacity and conductivity matrices for the m nodes along the depth of the tool. Shapes of the
-        results: (m, m) and (m,).
-
-        Args:
-            c: factor of the rates of heat in the stage of a time step, time.
-        """
+        """Return (M + c K)^-1, shape (m, m), and its first column times c, shape (m,), along the depth of the tool."""
         inverse = np.linalg.inv(self._M + c * self._K)
         return inverse, c * inverse[:, 0]

@@ -38,18 +38,7 @@ class ToolHeat(NamedTuple):
 
     @classmethod
     def of(cls, name: str, given: Any) -> ToolHeat:
-        """Return the heat exchange from the pair that a user gave for a contact.
-
-        Args:
-            name: name of the contact, for the message.
-            given: pair (conductance, tool).
-
-        Returns:
-            The heat exchange.
-
-        Raises:
-            InputError: `given` is not a pair (conductance, tool).
-        """
+        """Return the heat exchange of a contact from the pair (conductance, tool); otherwise an InputError names it."""
         try:
             return cls(*given)
         except TypeError:

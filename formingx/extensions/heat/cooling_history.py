@@ -87,9 +87,7 @@ class CoolingHistory:
                           checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
 
     def _tool_contacts(self, body: Conduction) -> list[tuple[Any, Any, np.ndarray]]:
-        """Return (`HeatContact` of `body`, contact of the problem, conductances) for each tool with heat exchange.
-
-        The conductances, shape (n,), are the values in contact at the n nodes of the `HeatContact`.
+        """Return (`HeatContact`, contact of the problem, nodal conductances in contact (n,)) for each tool with heat.
         """
         contacts = [c for c in self._problem.contacts if self._cooling.conducts(c.contact)]
         return [(touch, contact, touch.conductance.copy())
@@ -345,13 +343,7 @@ class CoolingHistory:
 
 
 def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
-    """Set the conductance of each contact node; 0 if the tool is absent or away from the deformed position of the node.
-
-    Args:
-        body: heat equation of the body.
-        tool_contacts: (`HeatContact`, contact of the problem, nodal conductances in contact) of each tool.
-        control: load parameter (control) of the state, dimensionless; it gives the travel of the tools.
-    """
+    """Set the conductance of each contact node; 0 if the tool is absent or away from the node in the state."""
     u = body.displacements()
     for touch, contact, conductance in tool_contacts:
         depth = contact.contact.tool.signed_distance(touch.points + u[touch.dofs] - contact.tool_displacement(control))
@@ -359,12 +351,9 @@ def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, 
 
 
 def _finer_elements(scene: Any, times: float, duration: float) -> str:
-    """Return advice on element sizes that reduce the temperature error, or "" if none is known.
+    """Return advice on element sizes that reduce the error `times` (of third order in the size), or "" if unknown.
 
-    Args:
-        scene: the scene whose sheet gets the finer elements.
-        times: factor by which the error must decrease. The error is of third order in the element size.
-        duration: time during which heat has penetrated, for the depth of the thin elements.
+    `duration` is the time during which heat has penetrated; it gives the depth of the thin elements.
     """
     laws = {law.on for law in [*scene.heat.boundaries, *scene.heat.contacts_with_tools(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
@@ -376,11 +365,6 @@ def _finer_elements(scene: Any, times: float, duration: float) -> str:
 
 
 def _equal(a: Any, b: Any) -> bool:
-    """Return True if the temperatures of two steps are equal.
-
-    Args:
-        a: (time, temperatures, start) of the first step, where `start` is (time, temperatures) at its start, or None.
-        b: the same data of the second step.
-    """
+    """Return True if two steps, each (time, temperatures, start or None), have equal temperatures."""
     same = a[0] == b[0] and np.array_equal(a[1], b[1]) and (a[2] is None) == (b[2] is None)
     return same and (a[2] is None or a[2][0] == b[2][0] and np.array_equal(a[2][1], b[2][1]))

@@ -30,14 +30,8 @@ _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
     """Cut the elements of a mesh into thin layers below faces that exchange heat; collective.
 
-    Args:
-        mesh: the mesh.
-        depths: {boundary: penetration depths of heat at the first and the last time of interest, length}.
-        moved: function from reference to deformed positions, both of shape (n, 2), length; depths are then measured in
-            the deformed body. None: depths in the reference configuration.
-
-    Returns:
-        The new mesh; the given mesh if its elements are thin enough, or too curved to be cut.
+    `depths` are penetration depths at the first and last time, length, in positions `moved` (n, 2). Thin or curved
+    elements stay.
     """
     grid = gathered(mesh)
     cuts = _cuts(grid, depths, moved(grid.points) if moved else grid.points)
@@ -48,18 +42,9 @@ def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callab
 
 
 def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[float]:
-    """Return relative sizes of layers of elements through a sheet, from the bottom up; collective.
+    """Return relative sizes of layers that grow by 1.26 with the distance from the faces, bottom up; collective.
 
-    Sizes grow by a factor of 1.26 per layer with the distance from the given faces.
-
-    Args:
-        mesh: mesh of the sheet.
-        faces: "bottom", "top" or both.
-        part: largest allowed thickness of the new layer at a face, over the height of the present elements there.
-        depth: penetration depth of heat, length. The layer at a face is at most `_LAYER_THICKNESS` times as thick.
-
-    Returns:
-        Relative sizes of the n layers, dimensionless, for the argument `elements=(n, sizes)` of a mesh.
+    The first is at most `part` of the present element and `_LAYER_THICKNESS` times the penetration depth (length).
     """
     grid = gathered(mesh)
     heights, lengths, area = zip(*(_boundary_sizes(grid, face) for face in faces))
@@ -70,29 +55,12 @@ def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[
 
 
 def height_at(mesh: Mesh, face: str) -> float:
-    """Return the median height of the elements along a boundary, perpendicular to it; collective.
-
-    Args:
-        mesh: the mesh.
-        face: name of the boundary.
-
-    Returns:
-        Height, length.
-    """
+    """Return the median height of the elements along a boundary, perpendicular to it, length; collective."""
     return _boundary_sizes(gathered(mesh), face)[0]
 
 
 def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
-    """Return sizes of the elements along a boundary and of the grid.
-
-    Args:
-        grid: the grid.
-        face: name of the boundary.
-
-    Returns:
-        Median height of the elements perpendicular to the boundary, length; length of the boundary; area of the whole
-        grid, length^2.
-    """
+    """Return median height of the elements along a face, length of the face, and area of the whole grid."""
     triangles = np.concatenate([rows[:, :3] for rows in grid.layers.values()])
     double = np.abs(np.linalg.det(grid.points[triangles[:, 1:]] - grid.points[triangles[:, :1]]))
     ends = grid.boundaries[face][:, :2]
@@ -103,17 +71,10 @@ def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
 
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
-    """Return the positions of cuts on edges, which divide elements below heated or cooled faces into thin layers.
+    """Return {(first, last): cuts} of edges, which divide elements below heated or cooled faces into thin layers.
 
-    Args:
-        grid: the grid.
-        depths: {boundary: penetration depths of heat at the first and the last time of interest, length}.
-        points: positions of the nodes of the grid in the configuration in which depths below a boundary are measured,
-            shape (n, 2), length.
-
-    Returns:
-        {(first, last): cuts}: node numbers of the ends of an edge, and the increasing positions of its cuts, where 0 is
-        the first end and 1 the last. The first end has the smaller (R, Z). Edges without cuts are left out.
+    Keys are node numbers, the first of smaller (R, Z); cuts increase from 0 to 1. Depths are measured at `points`,
+    shape (n, 2), length.
     """
     if not depths:
         return {}
@@ -137,11 +98,9 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
 
 
 def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the distance of each node of a grid from the nearest edge of a boundary, shape (n,), length.
+    """Return the distance of n points, shape (n, 2), from the nearest straight edge, shape (n,), length.
 
-    Args:
-        points: positions of the n nodes, shape (n, 2), length.
-        edges: node numbers of both ends of the m straight edges of the boundary, shape (m, 2).
+    Edges are pairs of node numbers, shape (m, 2).
     """
     away = np.full(len(points), np.inf)
     for a, b in points[edges]:
@@ -151,12 +110,7 @@ def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return edges with sorted ends, shape (n, 2): first the end of smaller R, or of smaller Z if both have the same R.
-
-    Args:
-        points: positions (R, Z) of the m nodes, shape (m, 2), length.
-        edges: node numbers of both ends of n edges, shape (n, 2).
-    """
+    """Return edges, shape (n, 2), whose first end has the smaller R, or the smaller Z at equal R."""
     a, b = points[edges[:, 0]], points[edges[:, 1]]
     swap = (a[:, 0] > b[:, 0]) | (a[:, 0] == b[:, 0]) & (a[:, 1] > b[:, 1])
     return np.where(swap[:, None], edges[:, ::-1], edges)
@@ -164,10 +118,6 @@ def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 class _Nodes:
     """Nodes of a grid whose elements are cut into layers: the old nodes, and new ones on cut edges and in triangles.
-
-    Args:
-        grid: the grid before the cut.
-        cuts: {(first, last): cuts}: node numbers of the ends of an edge, and the positions of its cuts, from 0 to 1.
 
     Attributes:
         points: list of the positions of all nodes so far, shape (2,) each, length.
@@ -180,16 +130,9 @@ class _Nodes:
         self._middles: dict[tuple[int, int], int] = {}
 
     def edge_nodes(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
-        """Return the nodes along an edge from node a to node b, with new nodes at its cuts.
+        """Return numbers and positions, 0 at node a to 1 at b, of the nodes along an edge, with new nodes at its cuts.
 
-        Args:
-            a: number of the first end.
-            b: number of the other end.
-            curve: positions of the nodes of the uncut edge: its ends, and its middle if it is quadratic, shape (2, 2)
-                or (3, 2), length.
-
-        Returns:
-            Numbers of the nodes; their positions along the edge, from 0 at a to 1 at b.
+        `curve` has the ends of the edge, and its middle if it is quadratic, shape (2 or 3, 2), length.
         """
         forward = bool(_ordered(self._old, np.array([[a, b]]))[0, 0] == a)
         key = (a, b) if forward else (b, a)
@@ -208,13 +151,7 @@ class _Nodes:
         return self._middles[key]
 
     def keep(self, a: int, b: int, middle: int) -> None:
-        """Store the middle node of an edge without cuts, so that `middle` returns it.
-
-        Args:
-            a: node number of the first end.
-            b: node number of the other end.
-            middle: number of the existing middle node.
-        """
+        """Store the middle node of the uncut edge (a, b), so that `middle` returns it."""
         self._middles[min(a, b), max(a, b)] = middle
 
     def _new(self, point: Any) -> int:
@@ -224,12 +161,7 @@ class _Nodes:
 
 
 def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return n points of an edge, shape (n, 2), length.
-
-    Args:
-        curve: positions of its ends, and of its middle if it is quadratic, shape (2, 2) or (3, 2), length.
-        s: parameters of the points, 0 at the first end and 1 at the second, shape (n,).
-    """
+    """Return points of an edge at parameters s from 0 to 1, shape (n, 2); `curve` is its 2 or 3 nodes, length."""
     s = np.asarray(s, dtype=float)[:, None]
     if len(curve) == 2:
         return (1 - s) * curve[0] + s * curve[1]
@@ -237,24 +169,14 @@ def _on_curve(curve: np.ndarray, s: np.ndarray) -> np.ndarray:
 
 
 def _in_element(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
-    """Return the position of a point of a triangle, shape (2,), length.
-
-    Args:
-        nodes: positions of the nodes of the triangle, shape (3, 2) or (6, 2), length.
-        x: area coordinates of the point, shape (3,).
-    """
+    """Return the position, shape (2,), at area coordinates x (3,) of a triangle with 3 or 6 nodes."""
     if len(nodes) == 3:
         return x @ nodes
     return (x * (2 * x - 1)) @ nodes[:3] + 4 * np.array([x[0] * x[1], x[1] * x[2], x[2] * x[0]]) @ nodes[3:]
 
 
 def _cut_grid(grid: Grid, cuts: dict[tuple[int, int], np.ndarray]) -> Grid:
-    """Return a grid with cut edges, in which triangles are divided into smaller ones between the cuts of their edges.
-
-    Args:
-        grid: the grid.
-        cuts: {(first, last): cuts}: node numbers of the ends of an edge, and the positions of its cuts, from 0 to 1.
-    """
+    """Return a grid in which triangles are divided between the cuts, {(first, last): positions from 0 to 1}."""
     nodes = _Nodes(grid, cuts)
     quadratic = next(iter(grid.layers.values())).shape[1] == 6
     layers, boundaries = {}, {}
@@ -277,14 +199,7 @@ def _integer_rows(table: np.ndarray) -> list[list[int]]:
 
 
 def _pieces(grid: Grid, nodes: _Nodes, row: list[int], quadratic: bool) -> list[list[int]]:
-    """Cut one triangle into smaller ones, and return a list of 3 or 6 node numbers for each.
-
-    Args:
-        grid: the grid before the cut.
-        nodes: nodes of the cut grid; new ones are added.
-        row: node numbers of the triangle.
-        quadratic: True if triangles have 6 nodes.
-    """
+    """Cut the triangle with node numbers `row` into smaller ones, rows of 3 or 6 numbers; adds new nodes to `nodes`."""
     element, at = grid.points[row], {row[k]: np.eye(3)[k] for k in range(3)}      # area coordinates of nodes
     sides = {}
     for k, (i, j) in enumerate(((0, 1), (1, 2), (2, 0))):

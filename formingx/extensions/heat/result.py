@@ -330,11 +330,7 @@ class HeatRun:
         return self.outputs if times is None else np.atleast_1d(np.asarray(times, dtype=float))
 
     def _default_line(self) -> list[np.ndarray]:
-        """Return the reference positions of the two ends of the default line through the body.
-
-        Raises:
-            InputError: the mesh has neither `bottom` and `top` nor `inner` and `outer`.
-        """
+        """Return the reference positions, (2,) each, of the ends of the default line; InputError if it has none."""
         for low, high in (("bottom", "top"), ("inner", "outer")):
             if {low, high} <= set(self.mesh.boundaries):
                 return [self.mesh.line_of(low)[0], self.mesh.line_of(high)[0]]
@@ -344,11 +340,8 @@ class HeatRun:
     def _state_at(self, time: float | None) -> list[np.ndarray]:
         """Return the temperatures of body and tools at a time, as an entry of `states`; None: the end of the run.
 
-        Between two accepted states Hermite's cubic is used. Its slope in a state is the slope of the parabola through
-        this state and its two neighbours.
-
-        Raises:
-            InputError: a time outside the run.
+        Between accepted states Hermite's cubic is used, with slopes of parabolas through neighbours. A time outside the
+        run is an InputError.
         """
         times = self._times
         t = times[-1] if time is None else finite("time", time)
@@ -380,12 +373,7 @@ class HeatRun:
         return [sum(w * v for w, v in zip(weights, parts)) for parts in zip(*self.states[i - 1: i + 2])]
 
     def _extreme(self, T: np.ndarray, sign: int) -> Spot:
-        """Return the node with the largest or smallest temperature on all ranks.
-
-        Args:
-            T: temperatures of the nodes of this rank, shape (n,).
-            sign: 1 for the largest temperature, -1 for the smallest.
-        """
+        """Return the node of the largest (sign 1) or smallest (sign -1) of temperatures T, shape (n,); all ranks."""
         k = int(np.argmax(sign * T)) if len(T) else -1
         mine = (sign * T[k], *self._body.points[k].tolist()) if len(T) else (-np.inf, 0.0, 0.0)
         value, R, Z = max(self._comm.allgather(mine))
@@ -394,10 +382,7 @@ class HeatRun:
     def _first_time_inside(self, excess: Any, times: list[float], from_time: float | None = None) -> float | None:
         """Return the first time at which the function `excess` of time is 0 or negative; None if there is none.
 
-        Args:
-            excess: function of time that returns a float.
-            times: times of steps to examine, in order. Between two of them the root is computed.
-            from_time: a time before the first of `times`, from which on a root is sought, or None.
+        The sign is examined at `times`, and from `from_time` on; the root between two of them is computed.
         """
         from scipy.optimize import brentq
         before = from_time

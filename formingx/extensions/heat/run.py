@@ -99,17 +99,10 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
 
 def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
             times: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return {boundary: (smallest, largest) penetration depth of heat, length}.
+    """Return {boundary: (smallest, largest) penetration depth of heat, length}, sqrt(a t) with diffusivity a.
 
-    A depth is sqrt(a t) with a diffusivity a and a time t. The smallest has the smallest diffusivity of all layers. Its
-    time is the first output time, or `_FIRST_ACCURATE_TIME` times the last output time if this is earlier. The largest
-    has the largest diffusivity, and its time is the last output time. At a boundary with absorption the smallest is 1 /
-    absorption coefficient, or the smaller of both if another law acts there too.
-
-    Args:
-        materials: {layer: `ThermalProperties`}.
-        boundaries: laws of heat.
-        times: output times, shape (n,).
+    The smallest has the first output time, at least `_FIRST_ACCURATE_TIME` of the last. Absorption limits it to 1 /
+    absorption coefficient.
     """
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())
@@ -123,12 +116,7 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
 
 
 class _Displacement:
-    """Displacement of a body as a quadratic `Function`, evaluated at points or on another mesh; collective.
-
-    Args:
-        displacement: (u_r, u_z), a Function or UFL expression, length.
-        mesh: the mesh on which it is given.
-    """
+    """Displacement of a body as a quadratic `Function`, evaluated at points or on another mesh; collective."""
 
     def __init__(self, displacement: Any, mesh: Mesh):
         space = fem.functionspace(mesh.domain, ("Lagrange", 2, (2,)))
@@ -168,15 +156,7 @@ def _set_initial_temperature(body: Conduction, start: Any, unit: str) -> None:
 def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: float, max_steps: int) -> None:
     """Integrate from time 0 to the last output time, and record the accepted steps in the run.
 
-    Args:
-        run: the run, whose last state is the initial one.
-        body: heat equation of the body.
-        outputs: output times.
-        tolerance: largest estimated error of one step, degrees.
-        max_steps: maximum number of steps.
-
-    Raises:
-        ConvergenceError: steps became too short, or too many.
+    `tolerance` is the estimated error of a step, degrees. Too short or too many steps raise a ConvergenceError.
     """
     state, t, dt = run.states[0], 0.0, 1e-3 * outputs[0]
     for end in outputs:
@@ -199,14 +179,9 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
 
 
 def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
-    """Estimate the discretisation error of a run at its output times, and warn if it is too large.
+    """Set the discretisation errors of a run at its output times, and warn if they are large; frees the estimator.
 
-    It is too large above `tolerance` and above `WARNED_ERROR` times the span of temperatures in the run.
-
-    Args:
-        run: the run; its `errors_in_space` are set.
-        estimator: the estimator, which is destroyed at the end.
-        tolerance: largest estimated time integration error of one step, degrees.
+    Large is above `tolerance`, degrees, and above `WARNED_ERROR` times the span of temperatures in the run.
     """
     try:
         run.errors_in_space = np.array([estimator.largest(run.states[k], run.times[k])[0]
@@ -223,14 +198,9 @@ def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
 
 
 def implausible_diffusivities(materials: Iterable[ThermalProperties], length: float) -> Iterator[str]:
-    """Yield a text for each diffusivity that no polymer has in a system of units that suits the length of the body.
+    """Yield a text for each diffusivity outside 1e-8 to 1e-5 m2/s, in every unit that suits the length of the body.
 
-    Polymers have from 1e-8 to 1e-5 m2/s. Lengths may be in m, cm, mm, um or in, if the body is then from 0.1 mm to 20 m
-    long.
-
-    Args:
-        materials: thermal properties of the layers.
-        length: largest extent of the body, length.
+    Lengths may be in m, cm, mm, um or in, if the body is then from 0.1 mm to 20 m long.
     """
     metres = np.array([1.0, 1e-2, 1e-3, 1e-6, 0.0254])
     metres = metres[(length * metres > 1e-4) & (length * metres < 20)]
@@ -246,12 +216,6 @@ def implausible_radiation(materials: Iterable[ThermalProperties], boundaries: It
     """Yield a text for each radiation that heats a face far faster than conduction cools it, as in mixed units.
 
     Between a heater of 1000 K and 2 mm of a polymer the Biot number is about 2.
-
-    Args:
-        materials: thermal properties of the layers.
-        boundaries: laws of heat.
-        thickness: smallest extent of the body, length.
-        zero: absolute zero in the unit of temperatures.
     """
     conductivity = min(material.conductivity for material in materials)
     for law in boundaries:
@@ -266,17 +230,9 @@ def implausible_radiation(materials: Iterable[ThermalProperties], boundaries: It
 
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
-    """Check the materials argument of `heat` and `Cooling`.
+    """Return {layer: `ThermalProperties`} from the argument of a user, one for all layers or by layer.
 
-    Args:
-        mesh: the mesh, for its layers.
-        materials: {layer: `ThermalProperties`}, or one for all layers, as the user gave it.
-
-    Returns:
-        {layer: `ThermalProperties`}.
-
-    Raises:
-        InputError: the argument is not allowed, or a layer has no properties.
+    A layer without properties or another type is an InputError.
     """
     if isinstance(materials, ThermalProperties):
         materials = dict.fromkeys(mesh.layers, materials)
@@ -292,20 +248,10 @@ def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties
 
 
 def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
-    """Check the laws of faces that a user gave to `heat` or `Cooling`.
+    """Return the checked laws of faces and heat sources that a user gave.
 
-    Args:
-        mesh: the mesh, for its boundaries.
-        boundaries: laws of faces and heat sources.
-        absolute_zero: absolute zero in the unit of temperatures.
-
-    Returns:
-        List of the laws.
-
-    Raises:
-        InputError: an object that is no law of heat, an unknown boundary, a temperature below absolute zero, or a table
-            that does not cover its boundary. Also a second law, except `Absorption`, on a face of prescribed
-            temperature.
+    An InputError names an unknown law, boundary, a temperature below absolute zero, a table too short, or a second law
+    on a fixed face.
     """
     found = as_list("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
     prescribed = [b.on for b in found if isinstance(b, FixedTemperature)]

@@ -18,31 +18,16 @@ from .contact import HeatContact
 
 
 class SpaceError:
-    """Estimator of the discretisation error of the temperatures of a body with quadratic elements.
-
-    Args:
-        body: heat equation of the run, with quadratic elements.
-        finer: heat equation of the same body with cubic elements; `destroy` frees it.
-    """
+    """Estimator of the discretisation error of the temperatures of a body with quadratic elements."""
 
     def __init__(self, body: Conduction, finer: Conduction):
         self._body, self._finer = body, finer
         self._values, self._cubic_values = fem.Function(body.space), fem.Function(finer.space)
 
     def largest(self, state: list[np.ndarray], time: float) -> tuple[float, np.ndarray]:
-        """Estimate the largest discretisation error of the temperature in a state; collective.
+        """Estimate the largest error of the temperature, degrees, and its reference position, shape (2,); collective.
 
-        The estimate is the largest absolute nodal value of a correction e in the space of cubic elements. It satisfies
-        (M + t K) e = t (R(T) - M dT/dt), with capacity matrix M, conductivity matrix K, rate of heat R and time t. R
-        contains the present temperatures of the faces of tools. K contains the response of the tools to e.
-
-        Args:
-            state: temperatures of the body, shape (n,). Then for each tool in contact its excess temperatures over its
-                back, at m nodes along the depth, shape (contact nodes, m).
-            time: time since the start of the run.
-
-        Returns:
-            Error, degrees. Reference position of the largest error in the body, shape (2,), length.
+        The error is the largest nodal value of a correction e of cubic elements, (M + t K) e = t (R(T) - M dT/dt).
         """
         body, finer = self._body, self._finer
         slope = body.slope(body.rates(state)[0][0])
@@ -56,18 +41,7 @@ class SpaceError:
         return error, rows[np.argmax(rows[:, 0]), 1:3]
 
     def contact_fraction(self, touch: HeatContact, finer: HeatContact) -> np.ndarray:
-        """Interpolate the contact of the nodes of the quadratic elements to the k contact nodes of the cubic elements.
-
-        The run takes a facet between nodes in contact as touching, even if its middle bridges a concave tool.
-
-        Args:
-            touch: contact with the tool, of the quadratic elements, with its present conductances.
-            finer: the same contact, of the cubic elements.
-
-        Returns:
-            1 on facets whose nodes all touch, 0 where none of them touches, other values at the end of a contact, shape
-            (k,).
-        """
+        """Interpolate the contact of quadratic elements to the k contact nodes of cubic ones, 0 to 1, shape (k,)."""
         values = np.zeros(len(self._body.points))
         values[touch.dofs] = touch.conductance > 0
         return self._in_cubic_space(values)[finer.dofs]
@@ -77,17 +51,9 @@ class SpaceError:
         self._finer.destroy()
 
     def _face_temperatures(self, touch: HeatContact, finer: HeatContact, excess: np.ndarray) -> np.ndarray:
-        """Return the excess temperatures of a tool over its back, below the k contact nodes of cubic elements, degrees.
+        """Return excess temperatures of the tool below the k nodes of cubic elements, shape (k, m), degrees.
 
-        The shape is (k, m). Column 0 is the face of the tool, interpolated from the contact nodes of the quadratic
-        elements. The other m - 1 columns belong to nodes at a depth in the tool. They are 0, because they have no
-        effect on the body.
-
-        Args:
-            touch: contact with the tool, of the quadratic elements.
-            finer: the same contact, of the cubic elements.
-            excess: excess temperatures of the tool over its back for the contact nodes of the quadratic elements, shape
-                (contact nodes, m), degrees. The m nodes lie along the depth, the face first.
+        Column 0 is interpolated from `excess` of the quadratic elements; the others, without effect on the body, are 0.
         """
         found = np.zeros((len(finer.dofs), excess.shape[1]))
         if touch.conducts:

@@ -36,16 +36,9 @@ class Step(NamedTuple):
 
 
 def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
-    """Take one time step of the heat equation by TR-BDF2.
+    """Take one time step of the heat equation by TR-BDF2 from a temperature state (see `Conduction`).
 
-    Args:
-        body: heat equation of the body.
-        state: temperatures of the body at the start, shape (n,). Then for each tool in contact its excess temperatures
-            over its back, at m nodes along the depth, shape (contact nodes, m).
-        dt: length of the step, time.
-
-    Returns:
-        State, error and heats at the end of the step. The error is infinite if Newton's method found no solution.
+    The error is infinite if Newton's method found no solution.
     """
     c = dt * _D
     first, heats_first = body.rates(state)
@@ -69,27 +62,11 @@ def next_length(dt: float, error: float, tolerance: float) -> float:
     r"""Return the length of the next step from the error of the last one, with a safety factor of 0.9.
 
     .. math:: dt \; \min(\max(0.9 (tolerance/error)^{1/3}, 0.1), 5)
-
-    Args:
-        dt: length of the last step, time.
-        error: estimated error of the last step, degrees.
-        tolerance: largest allowed error, degrees.
-
-    Returns:
-        Length, time.
     """
     return dt * float(np.clip(0.9 * (tolerance / max(error, 1e-300)) ** (1 / 3), 0.1, 5.0))
 
 
 def fitted(dt: float, left: float) -> float:
-    """Return the length of a step that ends at an output time, or leaves no short step before it.
-
-    Args:
-        dt: length that the error allows, time.
-        left: time from the start of the step to the next output time.
-
-    Returns:
-        `left` if dt is at least `left`, otherwise the smaller of dt and left / 2.
-    """
+    """Return `left` if dt reaches an output time; otherwise the smaller of dt and left / 2, so no short step stays."""
     return left if dt >= left * (1 - 1e-9) else min(dt, left / 2)
 

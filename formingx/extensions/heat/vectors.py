@@ -41,59 +41,23 @@ class HeatVectors:
     _mass_form: Any
 
     def constant(self, value: float) -> fem.Constant:
-        """Return a constant for UFL forms, whose value can change without a new compilation of the forms.
-
-        Args:
-            value: value of the constant, which may be changed later.
-
-        Returns:
-            The DOLFINx `Constant`.
-        """
+        """Return a UFL constant, whose value can change without a new compilation of the forms."""
         return fem.Constant(self.mesh.domain, PETSc.ScalarType(value))
 
     def stored(self, change: np.ndarray) -> float:
-        """Return the heat that the whole body stores by a change of temperature, summed over ranks.
-
-        Args:
-            change: change of the nodal temperatures, locally owned entries, shape (n,), degrees.
-
-        Returns:
-            Heat.
-        """
+        """Return the heat stored by a change of nodal temperatures, shape (n,), degrees, summed over ranks."""
         return self.capacity * self._sum(self._mass(change))
 
     def mass(self, change: np.ndarray) -> np.ndarray:
-        """Return the capacity matrix M, over `capacity`, times a change of temperature.
-
-        Args:
-            change: change of the nodal temperatures, locally owned entries, shape (n,), degrees.
-
-        Returns:
-            Stored heat at the nodes over `capacity`, locally owned entries, shape (n,), degrees.
-        """
+        """Return M, over `capacity`, times a change of nodal temperatures; both shape (n,), degrees."""
         return self._mass(change)
 
     def source(self, make: Any) -> Any:
-        """Compile the form of a heat source, to be assembled by `assembled`.
-
-        Args:
-            make: function of a UFL test function v that returns the integral (UFL) of v times heat per time and volume.
-
-        Returns:
-            The compiled form.
-        """
+        """Compile a heat source: `make` maps a test function v to the integral of v times heat per time and volume."""
         return self._form(make(self._scale * self._v))
 
     def assembled(self, form: Any) -> np.ndarray:
-        """Assemble the form of a heat source: its heat per time at each node, divided by the capacity of the body.
-
-        Args:
-            form: result of `source`.
-
-        Returns:
-            Heat per time over the heat capacity of the whole body (`capacity`), degrees per time, locally owned
-            entries, shape (n,).
-        """
+        """Return the nodal heat per time of a compiled source over `capacity`, shape (n,), degrees per time."""
         return self._assemble(form)
 
     def _form(self, form: Any) -> Any:
@@ -109,23 +73,14 @@ class HeatVectors:
         return _compat.assemble_vector(self._buffer, form).copy()
 
     def _body_rate(self, T: np.ndarray) -> np.ndarray:
-        """Set the temperature `T` and return the heat per time that each node receives, without heat from tools.
-
-        It is divided by the heat capacity of the whole body (`capacity`), degrees per time, locally owned entries,
-        shape (n,).
-
-        Args:
-            T: nodal temperatures of the body, locally owned entries, shape (n,).
+        """Set the nodal temperature T (n,); return the heat per time without tools over `capacity`, degrees per time.
         """
         self.T.x.array[: self._n] = T
         self.T.x.scatter_forward()
         return self._assemble(self._rate_form) + self.power
 
     def _mass(self, change: np.ndarray) -> np.ndarray:
-        """Return M dT/c, locally owned entries, shape (n,), degrees, with the capacity matrix M and c = `capacity`.
-
-        change: change of the nodal temperatures dT, shape (n,), degrees.
-        """
+        """Return M dT/c, shape (n,), degrees, with the capacity matrix M and c = `capacity`, from dT, shape (n,)."""
         self._change.x.array[: self._n] = change
         self._change.x.scatter_forward()
         return self._assemble(self._mass_form)
