@@ -86,11 +86,7 @@ class Design:
         return self._run(self.parameters.vector(values or {}))
 
     def _make(self, vector: np.ndarray) -> tuple[Any, Any]:
-        """Return (scene, target) or (scene, list of stages), whichever the user's function returns, checked.
-
-        Args:
-            vector: values of the parameters, those of a profile at its knots, shape (n,).
-        """
+        """Return (scene, target or stages) of the user's function at parameters `vector`, shape (n,), checked."""
         made = self._build(**self.parameters.values(vector))
         if not isinstance(made, tuple) or len(made) != 2 or not isinstance(made[0], Scene):
             raise InputError("Design: build must return (scene, target) or (scene, stages)")
@@ -159,11 +155,7 @@ class Design:
     def _search(self, first: DesignRun, objective: WallObjective, max_runs: int, min_change: float) -> DesignResult:
         """Search with Gauss-Newton steps from the best run, which are halved if a run is worse or fails.
 
-        Args:
-            first: first run of the search.
-            objective: least-squares objective of the search.
-            max_runs: maximum number of runs.
-            min_change: the search ends if the predicted relative change of the wall (root mean square) is smaller.
+        The search ends after `max_runs` runs, or if the predicted relative change of the wall is below `min_change`.
         """
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size

@@ -41,16 +41,7 @@ SETTINGS = SearchSettings()
 
 
 def missed_target(what: str, requested: float | None, found: float) -> str:
-    """Return a text that reports a missed target.
-
-    Args:
-        what: name of the quantity, such as "volume".
-        requested: target of the quantity, or None.
-        found: value of the quantity in the best run.
-
-    Returns:
-        Text with the target and the value found; "" if they agree to 0.5 %, or there is no target.
-    """
+    """Return a text on the requested and the found value; "" if they agree to 0.5 %, or without a request."""
     if requested is None or abs(found / requested - 1) < NOTICEABLE:
         return ""
     return f"the {what} that was asked for, {requested:.5g}, was not reached: {found:.5g}"
@@ -60,13 +51,9 @@ class WallObjective:
     """Least-squares objective of a search: a wanted or an even wall thickness, and possibly a prescribed volume.
 
     The residuals are the relative deviations of the wall thickness at the nodes of the bottom face. The reference
-    length of a node is its distance from the axis along the middle line of the undeformed body.
-
-    Args:
-        run: first run of the search, with k nodes on its bottom face.
-        wall: wanted thickness, length: a number, a function of the reference length, or None for an even wall.
-        within: lowest and highest reference length of the nodes that count, length; None for all.
-        volume: prescribed reference volume, length^3, or None.
+    length of a node is its distance from the axis along the middle line of the undeformed body. The wanted thickness is a
+    number, a function of the reference length or None for an even wall, and wrong ones are an InputError. Nodes within the
+    lowest and highest reference length `within` count; None: all.
 
     Attributes:
         inside: mask of the nodes that count, shape (k,).
@@ -74,9 +61,6 @@ class WallObjective:
         target_wall: wanted thickness at the m nodes that count, shape (m,), length; None for an even or measured wall.
         measured: the `MeasuredWall` of a fit, or None.
         damping: Levenberg damping over the largest singular value of the sensitivities.
-
-    Raises:
-        InputError: a wanted thickness that is not positive, a function that fails, or fewer than two nodes count.
     """
 
     measured: Any = None
@@ -101,14 +85,8 @@ class WallObjective:
         with the thickness h at the m nodes that count, the wanted thickness w (for an even wall the mean of h), and the
         volume V. The last residual is left out without a prescribed volume V0.
 
-        Args:
-            run: a run of the search.
-
-        Returns:
-            Residuals, shape (m,) or (m + 1,), and derivatives, shape (m, n) or (m + 1, n).
-
-        Raises:
-            InputError: the run has no derivative.
+        Residuals have shape (m,) or (m + 1,), derivatives (m, n) or (m + 1, n). A run without derivative raises an
+        InputError.
         """
         jacobian = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
@@ -120,16 +98,7 @@ class WallObjective:
         return self._with_volume(run, residual, slopes)
 
     def _with_volume(self, run: DesignRun, residual: np.ndarray, slopes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return residuals and their derivatives, extended by a row for the volume if the volume is prescribed.
-
-        Args:
-            run: a run of the search.
-            residual: residuals of the wall, shape (m,).
-            slopes: their derivatives by the n parameters, shape (m, n).
-
-        Returns:
-            Residuals, shape (m,) or (m + 1,), and derivatives, shape (m, n) or (m + 1, n).
-        """
+        """Return residuals (m,) and derivatives (m, n), extended by a row for the volume if it is prescribed."""
         if self.volume is not None:
             volume_slope = run.derivative("volume")[1][0] / self.volume
             weight = SETTINGS.volume_weight * np.sqrt(len(residual))
@@ -138,29 +107,15 @@ class WallObjective:
         return residual, slopes
 
     def cost(self, run: DesignRun) -> float:
-        """Return the cost by which runs of a search are compared.
-
-        It is the mean square of the relative deviations of the thickness from the wanted thickness; for an even wall,
-        from the mean thickness. The square of the relative deviation of a prescribed volume is added.
-
-        Args:
-            run: a run of the search.
-
-        Returns:
-            Cost, dimensionless; the best run has the lowest.
-        """
+        """Return the mean square deviation of the wall plus that of a prescribed volume, relative; least is best."""
         wall = run.wall[self.inside]
         residual = np.mean((wall / (wall.mean() if self.target_wall is None else self.target_wall) - 1) ** 2)
         return float(residual + (0.0 if self.volume is None else (run.volume / self.volume - 1) ** 2))
 
     def shortfall(self, run: DesignRun) -> str:
-        """Return a text that reports the deviation of the best run from the wanted wall, and its reason.
+        """Return a text on the deviation of the best run from the wanted wall, and its reason.
 
-        Args:
-            run: best run of the search.
-
-        Returns:
-            The text; "" if all deviations are below 1 %, or no wall was wanted.
+        It is "" if all deviations are below 1 %, or no wall was wanted.
         """
         if self.target_wall is None:
             return ""
@@ -207,11 +162,6 @@ class MeasuredWallObjective(WallObjective):
     """Least-squares objective of a search: a measured wall thickness, and possibly a prescribed volume.
 
     The residuals are the relative deviations of the wall at the measured points of the part.
-
-    Args:
-        run: first run of the search.
-        measured: a `MeasuredWall` with m points.
-        volume: prescribed reference volume, length^3, or None.
     """
 
     damping = MEASURED_ACCURACY
@@ -221,53 +171,19 @@ class MeasuredWallObjective(WallObjective):
         self.measured = measured
 
     def residual(self, run: DesignRun) -> tuple[np.ndarray, np.ndarray]:
-        """Return the residuals of a run and their derivatives by the n parameters.
-
-        The residuals are the relative deviations of the wall from the measured wall at the m points. If the volume is
-        prescribed, the last residual is its relative deviation times 100 sqrt(m) (`SearchSettings.volume_weight`).
-
-        Args:
-            run: a run of the search.
-
-        Returns:
-            Residuals, shape (m,) or (m + 1,), and derivatives, shape (m, n) or (m + 1, n).
-
-        Raises:
-            InputError: the run has no derivative.
-        """
+        """Return the residuals of a run, shape (m,) or (m + 1,), and their derivatives, shape (m, n) or (m + 1, n)."""
         wall, jacobian = run.derivative(self.measured.of_path)
         return self._with_volume(run, wall / self.measured.wall - 1, jacobian / self.measured.wall[:, None])
 
     def cost(self, run: DesignRun) -> float:
-        """Return the cost by which runs of a search are compared.
-
-        It is the mean square of the relative deviations from the measured wall, plus the square of the relative
-        deviation of a prescribed volume.
-
-        Args:
-            run: a run of the search.
-
-        Returns:
-            Cost, dimensionless; the best run has the lowest.
-        """
+        """Return the mean square deviation from the measured wall plus that of a prescribed volume, relative."""
         residual = self.measured.of_path(run.path) / self.measured.wall - 1
         return float(np.mean(residual**2) + (0.0 if self.volume is None else (run.volume / self.volume - 1) ** 2))
 
 
 def _deviation(residual: np.ndarray, jacobian: np.ndarray, m: int, low: np.ndarray,
                high: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the step within bounds that minimises the linearised residuals, and the deviation of the wall after it.
-
-    Args:
-        residual: residuals before the step, first those of the wall, shape (k,).
-        jacobian: their derivatives by the n scaled parameters, shape (k, n).
-        m: number of residuals of the wall.
-        low: lower bounds of the step, shape (n,).
-        high: upper bounds of the step, shape (n,).
-
-    Returns:
-        Root mean square of the residuals of the wall after the step; the step, shape (n,).
-    """
+    """Return the root mean square of the wall's m residuals after the best step in bounds, and the step (n,)."""
     from scipy.optimize import lsq_linear
     step = lsq_linear(jacobian, -residual, bounds=(low, high)).x
     return float(np.sqrt(np.mean((residual + jacobian @ step)[:m] ** 2))), step
@@ -280,17 +196,9 @@ def _range(wall: np.ndarray) -> str:
 
 
 def mask_of_range(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
-    """Return the mask of the nodes of the bottom face whose reference lengths lie in a range.
+    """Return the mask of nodes of the bottom face in a range of reference lengths, shape (k,).
 
-    Args:
-        run: a run with k nodes on its bottom face.
-        within: lowest and highest reference length, length; None for all nodes.
-
-    Returns:
-        Mask, shape (k,).
-
-    Raises:
-        InputError: fewer than two nodes lie in the range.
+    With None all nodes count; fewer than two nodes are an InputError.
     """
     s = run.profile.reference_length
     if within is None:

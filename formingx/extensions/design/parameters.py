@@ -118,9 +118,6 @@ class Parameters:
 
     A parameter that is a number has one entry, a profile has an entry for each knot.
 
-    Args:
-        given: {parameter: start value, (start value, lower bound, upper bound), or the result of `spline`}.
-
     Attributes:
         names: names of the entries, such as "travel" or "wall[3]".
         start: start values, shape (n,).
@@ -128,9 +125,6 @@ class Parameters:
         high: upper bounds, shape (n,).
         size: size of each entry that scales its changes, shape (n,): its range if it has two bounds, else the magnitude
             of its start value, or 1 if that is 0.
-
-    Raises:
-        InputError: no parameters, a name that is no string, or wrong values or bounds.
     """
 
     def __init__(self, given: Mapping[str, Any]):
@@ -159,29 +153,15 @@ class Parameters:
         return {name: (entry.low, entry.high) for name, entry in self._given.items() if entry.profile}
 
     def values(self, vector: np.ndarray) -> dict[str, Any]:
-        """Return the values of the parameters for a vector, as arguments of the user's function.
-
-        Args:
-            vector: vector of the parameters, shape (n,).
-
-        Returns:
-            {parameter: number or `Knots`}.
-        """
+        """Return {parameter: number or `Knots`}, arguments of the user's function, of a vector, shape (n,)."""
         parts = np.split(vector, np.cumsum([len(entry.start) for entry in self._given.values()])[:-1])
         return {name: Knots(part, entry.smooth) if entry.profile else float(part[0])
                 for (name, entry), part in zip(self._given.items(), parts)}
 
     def vector(self, values: Mapping[str, Any]) -> np.ndarray:
-        """Return the vector for given values of parameters.
+        """Return the vector, shape (n,), for {parameter: number, values at the knots, or `Knots`}.
 
-        Args:
-            values: {parameter: number, values at the knots, or `Knots`}; the other parameters have their start values.
-
-        Returns:
-            Vector of the parameters, shape (n,).
-
-        Raises:
-            InputError: an unknown parameter, or the wrong number of values.
+        Other parameters have their start values. An unknown name or a wrong number of values is an InputError.
         """
         found, first = self.start.copy(), 0
         for name in values:
@@ -201,12 +181,7 @@ class Parameters:
 
 
 def _number(name: str, given: Any) -> Spline:
-    """Return the start value and the bounds of a parameter that is a single number, as a `Spline` with one knot.
-
-    Args:
-        name: name of the parameter.
-        given: start value, or (start value, lower bound, upper bound).
-    """
+    """Return the start value, or (start, lower bound, upper bound), of a number as a `Spline` with one knot."""
     parts: Sequence[Any] = (given, -np.inf, np.inf) if np.ndim(given) == 0 else tuple(given)
     if len(parts) != 3:
         raise InputError(f"Design: {name} = {given!r}: must be a number, (start, low, high) or fx.spline(...)")
@@ -216,14 +191,7 @@ def _number(name: str, given: Any) -> Spline:
 
 
 def _check_bounds(caller: str, start: np.ndarray, low: Any, high: Any) -> None:
-    """Raise an InputError unless the lower bound is below the upper, and the start values lie between them.
-
-    Args:
-        caller: name of the caller, for messages.
-        start: start values, shape (k,).
-        low: lower bound of all k values, a number.
-        high: upper bound of all k values, a number.
-    """
+    """Raise an InputError unless start values, shape (k,), lie between the bounds, and `low` is below `high`."""
     try:
         low, high = float(low), float(high)
     except (TypeError, ValueError):

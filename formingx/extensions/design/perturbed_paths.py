@@ -33,33 +33,14 @@ from .perturbed_runs import PerturbedRun, solve_perturbed
 
 
 def trace_perturbed(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> None:
-    """Solve for all perturbed runs at the last state of the base run, and store their states in them; collective.
-
-    A perturbed run is the base run with one parameter slightly changed. The caller computes derivatives by this
-    parameter as difference quotients between the runs.
-
-    Args:
-        path: the `Path` of the base run.
-        end: the `Target` of a run with one control, or the stages of a process.
-        perturbed: the perturbed runs; their states are updated in place.
-
-    Raises:
-        Failure: the base run has no derivatives by the parameters; the text of the failure is the reason.
-    """
+    """Solve for perturbed runs at the last state of the base run, in place; collective. Raises `Failure`."""
     _PerturbedPaths(path, end, perturbed).run()
 
 
 class _PerturbedPaths:
     """Perturbed runs that follow the path of the base run, state by state.
 
-    Args:
-        path: the `Path` of the base run.
-        end: the `Target` of a run with one control, or the stages of a process.
-        perturbed: the perturbed runs; their states are updated in place.
-
-    Raises:
-        Failure: a remeshed body, contact in three dimensions, or a parameter that changes the control of a stage or the
-            number of knots of its amplitudes.
+    A remeshed body, contact in space and a parameter that changes the control of a stage raise `Failure`.
     """
 
     def __init__(self, path: Path, end: Any, perturbed: Sequence[PerturbedRun]):
@@ -83,8 +64,7 @@ class _PerturbedPaths:
     def run(self) -> None:
         """Solve for the perturbed runs at the states of the base run, from its first state to its last.
 
-        Raises:
-            Failure: the base run has no derivatives by the parameters; the text of the failure is the reason.
+        Without derivatives by the parameters a `Failure` says why.
         """
         states = self.path.states
         history = self.problem.has_history
@@ -132,11 +112,8 @@ class _PerturbedPaths:
     def _begin_stage(self, setting: StepData) -> None:
         """Begin a stage, or a piece of a stage, in each perturbed run.
 
-        Piece 0 of a stage is the change from the stage before. A stage in time then has a piece for each interval
-        between successive knots of its amplitudes.
-
-        Args:
-            setting: step data of the stage or piece in the base run.
+        Piece 0 of a stage is the change from the stage before; a stage in time has a piece between successive knots of
+        its amplitudes.
         """
         for run in self.runs:
             problem, p = run.problem, run.plans[setting.stage]
@@ -162,13 +139,7 @@ class _PerturbedPaths:
             run.control = control
 
     def _solve_at(self, state: State, before: State, last: bool) -> None:
-        """Solve for the perturbed runs at an accepted state of the base run.
-
-        Args:
-            state: the state of the base run.
-            before: the state of the base run before it.
-            last: True if a stage or a piece of a stage ends at the state.
-        """
+        """Solve for the perturbed runs at a state of the base run; `last` if a stage or piece ends there."""
         with self.problem.state_context(replace(state, history_variables=state.history_variables_before)):
             self._closing = []
             for number, face in enumerate(self.problem.contacts):
@@ -200,16 +171,10 @@ class _PerturbedPaths:
                     perturbed.keep_open(free | closing)
 
     def _close_gaps(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
-        """Move the points of the perturbed runs whose gap closes within a step to their positions of gap closure.
+        """Move points of the perturbed runs whose gap closes in a step to their positions of gap closure.
 
-        Args:
-            number: number of the contact face.
-            face: the contact face of the base run, with n points.
-            state: state of the base run at the end of the step.
-            before: state of the base run at the start of the step.
-
-        Returns:
-            Mask of the points whose gap closes at the end of the step, shape (n,).
+        Returns the mask of those that close at the end of the step, shape (n,), for the n points of contact face
+        `number`.
         """
         history, law, n = face.history, face.law, self.problem.n_owned
         no_points = np.zeros(len(face.points), dtype=bool)
@@ -264,12 +229,8 @@ class _PerturbedPaths:
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
         """Return the constraints that determine at which point of its path each run is compared.
 
-        Args:
-            state: state of the base run.
-            last: True if a stage or a piece of a stage ends at the state.
-
-        Returns:
-            Constraint of the base run, or None for the plane normal to its path; constraints of the perturbed runs.
+        None for the base run is the plane normal to its path; `last` if a stage or a piece of a stage ends at the
+        state.
         """
         setting = self.problem.setting
         if not last:
@@ -299,8 +260,7 @@ class _PerturbedPaths:
     def _gap_constraints(self) -> tuple[Any, list[Any]]:
         """Return constraints that close, in every run, the gap that closes at the end of the base run's step.
 
-        Returns:
-            Constraint of the base run, or None without such a gap; constraints of the perturbed runs.
+        The first, of the base run, is None without such a gap.
         """
         for number, closing in enumerate(self._closing):
             face = self.problem.contacts[number]
@@ -314,16 +274,10 @@ class _PerturbedPaths:
 
 
 def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: bool) -> Any:
-    """Return a constraint that closes the gap of a contact point: its signed distance from the tool, 0 when closed.
+    """Return a constraint of (x, control, gradient) that closes the gap of a point (None on other ranks).
 
-    The constraint is a function of the unknowns x, the control and a vector that it fills with the gradient by x. It
-    returns the distance, length, and the derivative of the distance by the control.
-
-    Args:
-        problem: problem of the run.
-        face: contact face of the point.
-        point: local number of the point on the rank that owns it, None on other ranks.
-        with_gradient: True if the function also computes its gradient and its derivative by the control.
+    It returns the signed distance, length, and its derivative by the control, and fills the gradient by x if
+    `with_gradient`.
     """
     local = np.array([] if point is None else [point], dtype=int)
     law = face.law.part(local)
@@ -343,29 +297,14 @@ def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: b
 
 
 def _fixed_properties(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[int]]:
-    """Return the properties of a stage that no parameter may change.
-
-    Args:
-        p: the stage, with indices of its loads, supports and contacts in `Scene.items`.
-
-    Returns:
-        Indices of the controlled items. For each amplitude in time, (index of its item, how many knots it has). Indices
-        of the inactive items.
-    """
+    """Return indices of controlled items, (item, knots) of amplitudes in time, and indices of inactive items."""
     return p.numbers, [(i, len(table)) for i, table in p.tables], p.inactive
 
 
 def _projected(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """Move points along their velocities until they have given signed distances from a tool, to first order.
+    """Move points along their velocities until they have given gaps, to first order; positions (n, 2), length.
 
-    Args:
-        law: contact law of the points, which gives distances from the tool.
-        x: positions relative to the tool, shape (n, 2), length.
-        velocity: velocities of the points, shape (n, 2). A point with a velocity along the tool does not move.
-        gap: wanted signed distances, shape (n,), length.
-
-    Returns:
-        New positions, shape (n, 2), length.
+    Gaps are signed distances, shape (n,), length. A point with a velocity along the tool stays.
     """
     near = law.nearest(x)
     rate = np.einsum("ni,ni->n", near.normal, velocity)

@@ -64,11 +64,7 @@ class PerturbedRunFailure(Failure):
 class PerturbedRun:
     """Problem and present state of one perturbed run, a copy of the base run with one parameter slightly changed.
 
-    Args:
-        scene: scene with the changed parameter.
-        end: target or stages with the changed parameter.
-        base: the `Problem` of the base run.
-        name: name of the parameter.
+    Other elements, or another number of items or unknowns than in the base run, are an InputError.
 
     Attributes:
         name: name of the parameter.
@@ -83,9 +79,6 @@ class PerturbedRun:
         plans: `Plan` of each stage, in which loads, supports and contacts are indices into `Scene.items`.
         piece_end: process time at which the present piece of a stage in time ends: at a knot of an amplitude, or at the
             end of the stage.
-
-    Raises:
-        InputError: the elements of the mesh, or the number of items or unknowns, differ from the base run.
     """
 
     def __init__(self, scene: Any, end: Any, base: Problem, name: str):
@@ -105,39 +98,21 @@ class PerturbedRun:
         self.piece_end = 0.0
 
     def state(self, base: State) -> State:
-        """Return the present state of the perturbed run as a `State`.
-
-        Args:
-            base: state of the base run, which gives the tangent of the path, the stage and the kind of the state.
-
-        Returns:
-            The state.
-        """
+        """Return the present state as a `State`, with tangent, stage and kind of the base state."""
         return State(self.x, self.control, base.direction, base.slope, history_variables=self.history_variables,
                      stage=base.stage, kind=base.kind, time=self.problem.time_at(self.control))
 
     def residual(self, base_residual: np.ndarray) -> np.ndarray:
-        """Return the residual of the perturbed run at its state minus the residual of the base run at the base state.
-
-        Args:
-            base_residual: residual of the base run, locally owned entries, shape (n,).
-
-        Returns:
-            Difference, locally owned entries, shape (n,).
-        """
+        """Return the residual minus that of the base run; both of locally owned entries, shape (n,)."""
         self.problem.x.array_w[:] = self.x
         self.problem.residual(self.problem.x, self.control, self.F)
         self.F.array_w[:] -= base_residual
         return np.array(self.F.array_r)
 
     def balance(self, base_residual: np.ndarray) -> None:
-        """Compute the contact forces of the perturbed run by equilibrium with the internal forces of the body.
+        """Set the `unbalanced` force of each contact by equilibrium with the internal forces of the body.
 
         The gaps differ from those of the base run by less than round-off, so the contact law gives no accurate force.
-        The correction of the force of each contact is stored in its `unbalanced`.
-
-        Args:
-            base_residual: residual of the base run, locally owned entries, shape (n,).
         """
         forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
         F = self.residual(base_residual)[: self.problem.n_owned]
@@ -151,15 +126,7 @@ class PerturbedRun:
                 F[numbers] = 0.0                                 # a node between two tools counts once
 
     def constraint(self, equation: Any) -> float:
-        """Return the residual of a constraint at the present state of the perturbed run.
-
-        Args:
-            equation: constraint, a function of (x, control, gradient) that returns the residual first and overwrites
-                the PETSc vector `gradient`.
-
-        Returns:
-            Residual of the constraint.
-        """
+        """Return the residual of a constraint, a function of (x, control, gradient), at the present state."""
         self.problem.x.array_w[:] = self.x
         return float(equation(self.problem.x, self.control, self.gradient)[0])
 
@@ -181,20 +148,9 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
     with residual F' and constraint c' of the perturbed run, its unknowns x and its control lambda. Subscripts are
     derivatives. The problem of the base run must be in the state, with the history variables of the state before it.
 
-    Args:
-        curve: solver of the base run, a `Curve`.
-        state: accepted state of the base run.
-        perturbed: the perturbed runs; their states are updated in place.
-        equation: constraint of the base run, a function of (x, control, gradient). None: the perturbed states lie in
-            the plane normal to the path of the base run.
-        equations: constraint of each perturbed run.
-
-    Returns:
-        Residual of the base run at the state, locally owned entries, shape (n,).
-
-    Raises:
-        PerturbedRunFailure: no perturbed state is found near the base state.
-        Failure: the tangent is singular, or the quantity of the target does not change along the path.
+    `equation` is the constraint of the base run, None for the plane normal to its path. The residual of the base run is
+    returned, shape (n,). PerturbedRunFailure: no state is found; Failure: the tangent is singular or the target
+    constant.
     """
     problem, newton = curve.problem, curve.newton
     problem.x.array_w[:] = state.x
@@ -261,8 +217,5 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
 
 
 def _norm(problem: Any, x: np.ndarray) -> float:
-    """Return the Euclidean norm over all ranks of a vector.
-
-    problem: the `Problem`, for its ranks. x: locally owned entries of the vector, shape (n,).
-    """
+    """Return the Euclidean norm over all ranks of a vector of locally owned entries, shape (n,)."""
     return float(np.sqrt(problem.comm.allreduce(float(x @ x))))

@@ -20,17 +20,9 @@ _RANGE = "its range, or of its start value if a bound is missing"
 
 
 def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """Write the report of a search for design parameters as an HTML page (rank 0 writes).
+    """Write the report of a search for design parameters as an HTML page (rank 0 writes), and return its path.
 
-    Args:
-        result: result of the search.
-        file: path of the HTML file.
-        title: heading of the page.
-        deviations: {parameter: standard deviation}, a `Fit`, or a list of such; None: without uncertainty.
-        units: units of the labels.
-
-    Returns:
-        Path of the file.
+    `deviations` is {parameter: standard deviation}, a `Fit`, a list of such, or None for no uncertainty.
     """
     units = _units_of(result.best, units)
     before, best, (a, b) = result.before, result.best, result.cv
@@ -66,17 +58,9 @@ def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units)
 
 
 def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """Write the report of a run of a design as an HTML page (rank 0 writes).
+    """Write the report of a run of a design as an HTML page (rank 0 writes), and return its path.
 
-    Args:
-        run: the `DesignRun`.
-        file: path of the HTML file.
-        title: heading of the page.
-        deviations: {parameter: standard deviation}, a `Fit`, or a list of such; None: without uncertainty.
-        units: units of the labels.
-
-    Returns:
-        Path of the file.
+    `deviations` is {parameter: standard deviation}, a `Fit`, a list of such, or None for no uncertainty.
     """
     units = _units_of(run, units)
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
@@ -105,16 +89,8 @@ def _write(file: Any, title: str, summary: list[str], cards: list, notes: list, 
            sections: list[str], comm: Any) -> FilePath:
     """Write the page of a report on rank 0, and return its path.
 
-    Args:
-        file: path of the HTML file.
-        title: heading of the page.
-        summary: sentences below the heading.
-        cards: (value, its description) of each large number.
-        notes: (kind, text) of each note; the kind "bad" is a warning.
-        pictures: function that returns HTML elements.
-        table: HTML table of the parameters and their effects.
-        sections: further HTML elements.
-        comm: MPI communicator.
+    Cards are (value, description) of large numbers, notes (kind, text) with the kind "bad" for warnings. `pictures`
+    returns HTML elements.
     """
     def make() -> None:
         """Draw the pictures and write the file."""
@@ -161,14 +137,7 @@ def _sections(runs: list[Any], names: list[str], units: Units) -> str:
 def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations: Any, units: Units) -> None:
     """Draw the wall of a run over the reference length, with a band of its standard deviation.
 
-    Args:
-        axes: matplotlib axes.
-        run: the `DesignRun`.
-        colour: colour of the line.
-        label: label of the line.
-        spread: standard deviation of the wall at the k nodes, shape (k,), length, or None for no band.
-        deviations: {parameter: standard deviation}, a `Fit`, or a list of such, for the label of the band.
-        units: units of the labels.
+    `spread` is the deviation at the k nodes, shape (k,), length; None for no band. `deviations` name the band.
     """
     s = run.profile.reference_length
     axes.plot(s, run.wall, color=colour, label=label)
@@ -184,11 +153,7 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
 def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
     """Return an HTML figure of wall thickness over arc length: of the first and the best run, predicted and wanted.
 
-    Args:
-        result: the `DesignResult` of the search.
-        spread: standard deviation of the best wall at the k nodes, shape (k,), length; None: no band.
-        deviations: {parameter: standard deviation}, a `Fit`, or a list of such, for the label of the band.
-        units: units of the labels.
+    `spread` is the standard deviation of the best wall at the k nodes, shape (k,), length; None for no band.
     """
     drawing, axes = figure(1, width=9, height=4)
     s = result.best.profile.reference_length
@@ -203,12 +168,7 @@ def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
 
 
 def _profiles(before: Any, best: Any) -> str:
-    """Return an HTML figure of the parameters that are profiles, that is, splines along the body; "" without any.
-
-    Args:
-        before: first run of the search, a `DesignRun`.
-        best: best run of the search, a `DesignRun`.
-    """
+    """Return an HTML figure of parameters that are splines along the body, of first and best run; "" without any."""
     found = best.parameters.profiles
     if not found:
         return ""
@@ -241,12 +201,7 @@ def _heat_map(effects: Any, units: Units) -> str:
 
 
 def _uncertainties(run: Any, deviations: Any, units: Units) -> list[str]:
-    """Return HTML elements with the standard deviations of wall, volume, pressures and forces.
-
-    Args:
-        run: the `DesignRun`.
-        deviations: {parameter: standard deviation}, a `Fit`, or a list of such; None: an empty list is returned.
-        units: units of the labels.
+    """Return HTML elements with standard deviations of wall, volume, pressures and forces; none without `deviations`.
     """
     if not deviations:
         return []
@@ -271,11 +226,7 @@ def _uncertainties(run: Any, deviations: Any, units: Units) -> list[str]:
 def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
     """Return an HTML table with the value, the bounds and the effects of every parameter.
 
-    Args:
-        run: the `DesignRun`.
-        effects: `Effects`: derivatives of the wall thickness by the parameters.
-        units: units of the labels.
-        before: first run of a search, for a column with its values, or None.
+    `before`, the first run of a search or None, adds a column with its values.
     """
     p, tenth = run.parameters, effects.jacobian * effects.sizes / 10
     thin, volume_change = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10

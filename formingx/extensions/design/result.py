@@ -18,14 +18,7 @@ from .run import DesignRun
 
 
 def unevenness(wall: np.ndarray) -> float:
-    """Return the standard deviation of wall thicknesses over their mean.
-
-    Args:
-        wall: thicknesses at k nodes, shape (k,), length.
-
-    Returns:
-        The ratio, dimensionless; 0 for an even wall.
-    """
+    """Return the standard deviation of wall thicknesses, shape (k,), length, over their mean."""
     return float(wall.std() / wall.mean())
 
 

@@ -146,13 +146,10 @@ class DesignRun:
 
     @cached_property
     def _perturbed_runs(self) -> list[tuple[list[PerturbedRun], float]]:
-        """For each parameter: the perturbed runs, in their last state, and the denominator of the difference quotient.
+        """Return perturbed runs in their last state, and the denominator of the difference quotient, by parameter.
 
-        Without contact there are two runs, at the parameter's value plus and minus a step; the denominator is two
-        steps. With contact there is one run; the denominator is its value of the parameter minus the value in this run.
-
-        Raises:
-            InputError: the run has no derivative.
+        It is two steps of the parameter for the two runs without contact, one step for the single run with contact. A
+        run without derivative raises an InputError.
         """
         contact, reason = bool(self.path.problem.contacts), ""
         for size in [_CONTACT_CHANGE / 10**k for k in range(3)] if contact else [DIFFERENCE_STEP]:
@@ -287,11 +284,7 @@ class DesignRun:
     def _value(self, measure: Any) -> np.ndarray:
         """Return the values of an output quantity in the last state of this run, shape (m,).
 
-        Args:
-            measure: "wall", "volume", a column of the path, or a function of a path that uses only its last state.
-
-        Raises:
-            InputError: the quantity depends on earlier states, or is none of these.
+        It is "wall", "volume", a column or a function of a path; an InputError says if it depends on earlier states.
         """
         if isinstance(measure, str):
             if measure in ("wall", "volume"):
@@ -318,28 +311,14 @@ class DesignRun:
 
     @staticmethod
     def _check_last_alone(values: np.ndarray, alone: Any, what: str) -> None:
-        """Check that a quantity does not depend on earlier states.
-
-        Args:
-            values: the quantity in the last state of the run, shape (m,).
-            alone: the same of the last state alone.
-            what: "function of the path" or the column, for the message.
-
-        Raises:
-            InputError: both differ.
-        """
+        """Raise an InputError if values (m,) of a run and of its last state alone differ; `what` names them."""
         if not np.allclose(values, alone, rtol=1e-9, atol=0):
             raise InputError(f"Design: a measure must be one of the last state alone: this {what} looks at"
                              " earlier states too, whose derivatives are not kept; compare whole runs at two values of"
                              " the parameter")
 
     def _perturbed_value(self, perturbed: PerturbedRun, measure: Any) -> Any:
-        """Return the values of an output quantity in a perturbed run, shape (m,) or a number.
-
-        Args:
-            perturbed: the perturbed run, at its last state.
-            measure: "wall", "volume", a column of the path, or a function of a path that uses only its last state.
-        """
+        """Return an output quantity in the last state of a perturbed run, shape (m,) or a number (see `_value`)."""
         if measure == "volume":
             return _volume(perturbed.problem)
         state = perturbed.state(self.path.last)
@@ -359,12 +338,7 @@ def _volume(problem: Any) -> float:
 
 
 def _path_of(state: Any, record: Record) -> Path:
-    """Return a path that contains a copy of one state, with its own measures.
-
-    Args:
-        state: the state.
-        record: an empty record of a run.
-    """
+    """Return a path with a copy of one state, with its own measures, in an empty record of a run."""
     path, state = Path(record), replace(state)
     record.segments[-1].states.append(state)
     for listener in record.hooks.on_state:

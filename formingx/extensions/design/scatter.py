@@ -85,20 +85,10 @@ class Band:
 
 
 def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray:
-    """Return the covariance of the n parameters of a design; a profile counts as one parameter for each knot.
+    """Return the covariance, shape (n, n), of the parameters of a design; each knot of a profile counts as one.
 
-    Args:
-        caller: name of the caller, for messages.
-        parameters: the parameters of the design.
-        given: {parameter: standard deviation}; the knots of a profile are independent, with equal deviations. Or a
-            `Fit` whose constants have the names of parameters, or the `Confidence` of a fit to a measured wall, with
-            its covariance. Or a list of such, independent of each other.
-
-    Returns:
-        Covariance, shape (n, n).
-
-    Raises:
-        InputError: a name is no parameter, or the tests of a fit leave constants undetermined.
+    `given` is {parameter: standard deviation}, a `Fit`, a `Confidence`, or a list of such, independent of each other.
+    Unknown names and undetermined constants are an InputError.
     """
     found = np.zeros((len(parameters), len(parameters)))
     for part in given if isinstance(given, list | tuple) and not hasattr(given, "covariance") else [given]:
@@ -130,17 +120,7 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
 def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
     """Return an output quantity of a run with its confidence band for uncertain parameters, to first order.
 
-    Args:
-        run: the `DesignRun`.
-        given: {parameter: standard deviation}, a `Fit` with its covariance, or a list of such.
-        measure: the quantity: "wall", "volume", a column of the path, or a function of a path.
-        confidence: confidence level of the band, between 0 and 1.
-
-    Returns:
-        Values and band of the quantity.
-
-    Raises:
-        InputError: a confidence outside (0, 1), a name that is no parameter, or the run has no derivative.
+    `given` and `measure` as in `DesignRun`; a level outside (0, 1) is an InputError.
     """
     confidence = fraction("band: confidence", confidence)
     effects = run.sensitivities(measure)
@@ -149,25 +129,11 @@ def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
 
 
 def deviations(jacobian: np.ndarray, covariance: np.ndarray) -> np.ndarray:
-    """Return the standard deviations of m values that depend on n uncertain parameters, to first order.
-
-    Args:
-        jacobian: derivatives of the values by the n parameters, shape (m, n).
-        covariance: covariance of the parameters, shape (n, n).
-
-    Returns:
-        Standard deviations, shape (m,).
-    """
+    """Return standard deviations (m,) of values from their derivatives (m, n) and the covariance (n, n)."""
     return np.sqrt(np.maximum(np.einsum("mi,ij,mj->m", jacobian, covariance, jacobian), 0.0))
 
 
 def _unknown(caller: str, name: Any, parameters: Parameters) -> InputError:
-    """Return the InputError for an unknown parameter, whose message lists the known ones.
-
-    Args:
-        caller: name of the caller, for the message.
-        name: the unknown name.
-        parameters: the parameters of the design.
-    """
+    """Return the InputError for an unknown parameter, whose message lists the known ones."""
     known = dict.fromkeys(entry.partition("[")[0] for entry in parameters.names)
     return InputError(f"{caller}: parameter {name!r} is not known; known: {', '.join(known)}")
