@@ -51,9 +51,9 @@ class WallObjective:
     """Least-squares objective of a search: a wanted or an even wall thickness, and possibly a prescribed volume.
 
     The residuals are the relative deviations of the wall thickness at the nodes of the bottom face. The reference
-    length of a node is its distance from the axis along the middle line of the undeformed body. The wanted thickness is a
-    number, a function of the reference length or None for an even wall, and wrong ones are an InputError. Nodes within the
-    lowest and highest reference length `within` count; None: all.
+    length of a node is its distance from the axis along the middle line of the undeformed body. The wanted thickness is
+    a number, a function of the reference length or None for an even wall, and wrong ones are an InputError. Nodes
+    within the lowest and highest reference length `within` count; None: all.
 
     Attributes:
         inside: mask of the nodes that count, shape (k,).
