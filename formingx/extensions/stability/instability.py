@@ -196,24 +196,13 @@ def _description(point: CriticalPoint) -> str:
 
 
 class StabilityAnalysis:
-    """Stability analysis of the states of a path; keeps the matrix and the factors of each mesh for further calls.
-
-    Args:
-        path: the `Path`.
-    """
+    """Stability analysis of the states of a path; keeps the matrix and the factors of each mesh for further calls."""
 
     def __init__(self, path: Any):
         self._path, self._modes = path, {}                              # type: ignore[var-annotated]
 
     def modes_of(self, segment: Any) -> Modes:
-        """Return the object that computes the modes on the mesh of a segment, created at the first call.
-
-        Args:
-            segment: the `Segment`, the part of the path on one mesh.
-
-        Returns:
-            The `Modes`.
-        """
+        """Return the `Modes` on the mesh of a segment of the path, created at the first call."""
         key = id(segment.problem)
         if key not in self._modes:
             self._modes[key] = Modes(segment.curve)
@@ -222,12 +211,7 @@ class StabilityAnalysis:
     def examine(self, modes: Iterable[float], states: Any) -> Stability:
         """Count unstable modes in states of the path, and locate the critical points between them.
 
-        Args:
-            modes: wave numbers.
-            states: number of states, evenly spaced on the path; "all"; or a list of states of the path.
-
-        Returns:
-            Counts and critical points.
+        `modes` are wave numbers; `states` is a number of evenly spaced states, "all" or a list of states.
         """
         numbers = wave_numbers(self._path.problem.scene, modes)
         chosen = _selected_states(self._path, states)
@@ -255,11 +239,7 @@ class StabilityAnalysis:
     def _locate(self, a: State, b: State, kind: ModeClass, unstable_modes: Any) -> list[CriticalPoint]:
         """Return the critical points of one kind of modes between two states, each located between neighbouring states.
 
-        Args:
-            a: the first state.
-            b: a later state of the path.
-            kind: wave number and symmetry of the modes.
-            unstable_modes: function of state and kind that returns the number of unstable modes.
+        `unstable_modes` is a function of state and kind that returns the number of unstable modes.
         """
         if unstable_modes(a, kind) == unstable_modes(b, kind):
             return []
@@ -295,10 +275,7 @@ class StabilityAnalysis:
     def _critical_point(self, segment: Any, found: LocatedPoint, limit: bool) -> CriticalPoint:
         """Return the `CriticalPoint` of a located point, with the mode at the nodes of all ranks.
 
-        Args:
-            segment: the `Segment`, the part of the path on one mesh.
-            found: the located point.
-            limit: True for a limit point.
+        `limit` is True for a limit point.
         """
         comm, nodes = segment.problem.comm, self.modes_of(segment).variation.nodes
         points, amplitudes = gathered(comm, nodes), gathered(comm, found.mode)
@@ -390,17 +367,9 @@ def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
 
 
 def wave_numbers(scene: Any, modes: Any) -> list[float]:
-    """Return the wave numbers that a user gave as a list without duplicates.
+    """Return the wave numbers that a user gave as a list without duplicates (in plane strain per length).
 
-    Args:
-        scene: the `Scene`.
-        modes: wave numbers: n round the axis; in plane strain k along the depth, 1/length.
-
-    Returns:
-        List of wave numbers.
-
-    Raises:
-        InputError: none, a negative or fractional number of waves, or waves shorter than the edges of the elements.
+    None, a negative or fractional number of waves, and waves shorter than the edges of the elements are an InputError.
     """
     try:
         numbers = [finite("stability: modes", n) for n in modes]
@@ -422,9 +391,7 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
 def _selected_states(path: Any, states: Any) -> list[State]:
     """Return the states to examine, in order along the path, without limit points unless they are given.
 
-    Args:
-        path: the `Path`.
-        states: number of evenly spaced states, with both ends of the path; "all"; or states of the path.
+    `states` is a number of evenly spaced states with both ends of the path, "all", or states of the path.
     """
     regular = [s for s in path.states if s.kind != "limit point"]
     if isinstance(states, State | list | tuple):

@@ -118,18 +118,12 @@ class _ModesOfState(NamedTuple):
 class Modes:
     """Modes of the second variation in the states of a problem: their number, and critical points between two states.
 
-    Args:
-        curve: the `Curve` of the problem, which solves for states.
-        lanczos: settings of the eigenvalue solver.
-        locating: settings for the location of critical points.
+    A membrane, an elastic support, or a load without a second variation is an InputError.
 
     Attributes:
         curve: the `Curve`.
         problem: the `Problem`.
         variation: the `SecondVariation` of the problem.
-
-    Raises:
-        InputError: a membrane, an elastic support, or a load without a second variation.
     """
 
     def __init__(self, curve: Curve, lanczos: LanczosSettings | None = None, locating: LocationSettings | None = None):
@@ -140,43 +134,21 @@ class Modes:
         self._in, self._out = self.variation.matrix.createVecs()
 
     def count(self, state: State, kind: ModeClass) -> int:
-        """Return the number of unstable modes with a wave number and symmetry in a state.
-
-        Args:
-            state: state of the path.
-            kind: wave number and symmetry.
-
-        Returns:
-            Number of modes.
-        """
+        """Return the number of unstable modes with a wave number and symmetry in a state of the path."""
         with self.problem.state_context(state):
             return self._count(kind)
 
     def _count(self, kind: ModeClass) -> int:
-        """Return the number of unstable modes of a wave number and symmetry at the present state of the problem.
-
-        Raises:
-            Failure: the second variation is singular.
-        """
+        """Return the number of unstable modes at the present state; `Failure` if the second variation is singular."""
         self.variation.fill(*kind)
         if not self._solver.factorise():
             raise Failure("the stiffness is singular for every mode: some part of the body has no stiffness", [])
         return self._solver.negative_pivots() - self.variation.negative_pivots
 
     def locate(self, a: State, b: State, kind: ModeClass, index: int) -> LocatedPoint:
-        """Locate the critical point between two states at which an eigenvalue of the second variation is 0.
+        """Locate the critical point between states a and b at which eigenvalue number `index` (ascending) is 0.
 
-        Counts of unstable modes bracket it. Inside the bracket it is predicted from the eigenvalues of one mode. The
-        mode is tracked by its shape, because eigenvalues of other modes cross it.
-
-        Args:
-            a: state before the point.
-            b: state behind it.
-            kind: wave number and symmetry of the mode.
-            index: number of the eigenvalue in ascending order, from 0.
-
-        Returns:
-            The critical point.
+        Counts of unstable modes bracket it; inside, the eigenvalues of one mode, tracked by its shape, predict it.
         """
         samples = [self._modes_of(0.0, a, kind, index), self._modes_of(1.0, b, kind, index)]
         (low, high), settings = samples, self._locating
@@ -212,44 +184,21 @@ class Modes:
         return LocatedPoint(kind, a, b, state, fraction, mode, unknowns, becomes_unstable, solved and exact)
 
     def _modes_of(self, fraction: float, state: State, kind: ModeClass, index: int) -> _ModesOfState:
-        """Return the number of unstable modes in a state, and its modes with eigenvalues nearest to 0.
-
-        Args:
-            fraction: position of the state between two others, from 0 to 1.
-            state: the state.
-            kind: wave number and symmetry of the modes.
-            index: number of the eigenvalue in ascending order that must be among those computed.
-        """
+        """Return count and modes with eigenvalues nearest to 0, number `index` included, at `fraction` (0 to 1)."""
         with self.problem.state_context(state):
             count = self._count(kind)
             return _ModesOfState(fraction, state, count, *self._lanczos(4 + abs(count - index)))
 
     def _mode_of_index(self, sample: _ModesOfState, index: int) -> Array:
-        """Return the mode of eigenvalue number `index` of a state, counted in ascending order from 0.
-
-        Only modes with eigenvalues near 0 are known. If this one is not, the known mode with the nearest number is
-        returned.
-
-        Args:
-            sample: known eigenvalues and modes of the state, and its number of negative eigenvalues.
-            index: number of the eigenvalue.
-        """
+        """Return the mode of ascending eigenvalue number `index`, or of the nearest known number."""
         negative = np.flatnonzero(sample.values < 0)
         k = (negative[-1] + 1 if len(negative) else 0) + index - sample.unstable
         return sample.modes[min(max(k, 0), len(sample.modes) - 1)]
 
     def _track(self, samples: list[_ModesOfState], end: _ModesOfState, index: int) -> list[tuple[float, float]]:
-        """Return the eigenvalue of one mode in several states between two states of a path.
+        """Return (fraction, eigenvalue) of one mode in the samples in which it is found by its shape.
 
-        A state in which no known mode has nearly the shape of this mode is left out.
-
-        Args:
-            samples: eigenvalues and modes of the two states and of states in between.
-            end: the state of the samples next to the critical point in which the mode is unstable.
-            index: number of the eigenvalue of the mode in this state, in ascending order from 0.
-
-        Returns:
-            List of (fraction, eigenvalue), where the fraction is the position of a state between the two, 0 to 1.
+        The mode has number `index` in the state `end`, in which it is unstable; fractions are positions from 0 to 1.
         """
         mode, found = self._mode_of_index(end, index), []
         for sample in samples:
@@ -261,8 +210,7 @@ class Modes:
     def _state_between(self, a: State, b: State, fraction: float) -> State:
         """Solve for the state at a fraction (0 to 1) of the way from state a of the path to state b.
 
-        Raises:
-            Failure: no convergence, or convergence to another branch.
+        `Failure` reports no convergence, or convergence to another branch.
         """
         if self.problem.has_history:
             raise Failure("with a history the state between two others depends on the steps", [])
@@ -343,12 +291,9 @@ class Modes:
 
 
 def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
-    """Return the fraction of a step at which an eigenvalue is 0, by inverse interpolation, or None outside bounds.
+    """Return the fraction of a step at which an eigenvalue is 0, by inverse interpolation; None out of bounds.
 
-    Args:
-        values: (fraction, eigenvalue) pairs of one mode; those with the smallest magnitudes are used, at most four.
-        low: lower bound of the fraction.
-        high: upper bound of the fraction.
+    At most four (fraction, eigenvalue) pairs of smallest magnitude are used.
     """
     known = sorted(values, key=lambda entry: abs(entry[1]))[:4]
     for n in range(len(known), 1, -1):

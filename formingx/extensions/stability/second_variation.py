@@ -45,11 +45,8 @@ _FREE_MOTION_FORCE = 1e-6
 class _BodyWithMode(LoadedBody):
     """Loaded body with a circumferential mode, as `Load.mode_work` expects it.
 
-    Args:
-        forms: forms of the body.
-        mode: displacement amplitudes (u_r, u_z, u_hoop) (UFL, shape (3,), length).
-        dmode: variation of these amplitudes (UFL, shape (3,), length).
-        H: change of F by the mode (UFL, shape (3, 3)).
+    The mode has displacement amplitudes (u_r, u_z, u_hoop) (UFL, shape (3,), length), `dmode` is their variation, and H
+    the change of F (UFL, shape (3, 3)).
     """
 
     def __init__(self, forms: Any, mode: Any, dmode: Any, H: Any):
@@ -62,10 +59,8 @@ class SecondVariation:
 
     A mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta), p = Q cos(n theta). In plane strain
     k x3 replaces n theta. Its unknowns are U, W, V + m U and Q at the nodes, with m = 1 for n = 1 and 0 else. A mode
-    antisymmetric about a symmetry plane is possible if the support has `mirror=True`.
-
-    Args:
-        problem: the `Problem` of a solid.
+    antisymmetric about a symmetry plane is possible if the support has `mirror=True`. A membrane, an elastic support,
+    or a load without a second variation is an InputError.
 
     Attributes:
         matrix: symmetric PETSc matrix for the modes of the last `fill`. One unknown of each free rigid motion is
@@ -75,9 +70,6 @@ class SecondVariation:
         negative_pivots: number of negative pivots of `matrix` in a stable state.
         nodes: reference positions of the locally owned nodes, shape (m, 2), length.
         mirrors: names of the symmetry planes about which modes may be antisymmetric.
-
-    Raises:
-        InputError: a membrane, an elastic support, or a load without a second variation.
     """
 
     def __init__(self, problem: Any):
@@ -102,14 +94,10 @@ class SecondVariation:
         self._constrained = np.zeros(0, dtype=np.int32)
 
     def fill(self, number: float, antisymmetric_about: str | None = None) -> Any:
-        """Assemble `matrix` at the present state for the modes of a wave number and symmetry.
+        """Assemble and return `matrix` at the present state for the modes of a wave number and symmetry.
 
-        Args:
-            number: circumferential wave number; in plane strain the wave number along the depth, 1/length.
-            antisymmetric_about: name of the symmetry plane about which the modes are antisymmetric, or None.
-
-        Returns:
-            `matrix` with new values.
+        In plane strain the number is a wave number along the depth, 1/length. Modes may be antisymmetric about a
+        symmetry plane, given by name.
         """
         problem, m = self.problem, float(self._axisymmetric and number == 1)
         self._number.value, self._m.value = number, m
@@ -131,14 +119,7 @@ class SecondVariation:
         return self.matrix
 
     def mass(self, x: np.ndarray) -> np.ndarray:
-        """Return the product of the lumped mass matrix and a mode; pressures have no mass.
-
-        Args:
-            x: mode, locally owned entries, shape (n,).
-
-        Returns:
-            Locally owned entries, shape (n,).
-        """
+        """Return the lumped mass matrix times a mode, owned entries, shape (n,); pressures have no mass."""
         U, W, V = self._unknowns.T
         m, out = self._m.value, np.zeros_like(x)
         round_axis = self._lumped * (x[V] - m * x[U])
@@ -147,26 +128,12 @@ class SecondVariation:
         return out
 
     def amplitudes(self, x: np.ndarray) -> np.ndarray:
-        """Return the radial, axial and hoop displacement amplitudes (U, W, V) of a mode at the m locally owned nodes.
-
-        Args:
-            x: mode, locally owned entries, shape (n,).
-
-        Returns:
-            Amplitudes over the length unit of the problem, shape (m, 3).
-        """
+        """Return amplitudes (U, W, V) of a mode, shape (n,), at owned nodes over the length unit, shape (m, 3)."""
         U, W, V = self._unknowns[~self._bubble].T
         return np.column_stack([x[U], x[W], x[V] - self._m.value * x[U]])
 
     def problem_unknowns(self, x: np.ndarray) -> np.ndarray:
-        """Return the amplitudes U and W and the pressures of a mode in the order of the unknowns of the problem.
-
-        Args:
-            x: mode, locally owned entries, shape (n,).
-
-        Returns:
-            Locally owned entries in the order of `Problem.x`.
-        """
+        """Return U, W and pressures of a mode, owned entries, shape (n,), in the order of `Problem.x`."""
         found = np.zeros(self.problem.x.getLocalSize())
         found[: self.problem.n_owned] = x[self._to_mode[: self.problem.n_owned]]
         return found
@@ -240,9 +207,7 @@ class SecondVariation:
         F, H = forms.elastic_F, forms.elastic(gradient(h))
 
         def changed(within: bool) -> Any:
-            """Return F plus some entries of the mode's H: in the blocks of F if `within`, else outside (UFL, (3, 3)).
-
-            The blocks are the section and the hoop entry.
+            """Return F plus entries of H in the blocks of F (section and hoop) if `within`, else outside (UFL, (3, 3)).
             """
             return ufl.as_tensor([[(F[i, j] if (i, j) in BLOCK else 0) + (H[i, j] if ((i, j) in BLOCK) is within
                                                                             else 0)
@@ -311,10 +276,7 @@ class SecondVariation:
     def _dofs(self, component: int, item: Any) -> np.ndarray:
         """Return the local numbers of the unknowns that a support constrains, with ghosts.
 
-        Args:
-            component: 0 for the radial amplitude U, 1 for the axial amplitude W, 2 for the third unknown. It is the
-                hoop amplitude V, or V + U for modes of one wave round the axis.
-            item: the `Constrained` boundary or point.
+        Component 0 is U (radial), 1 is W (axial), 2 the third unknown of the mode, V + m U.
         """
         space, forms = self.space.sub(0).sub(component), self._forms
         if item.on is not None:
@@ -326,12 +288,8 @@ class SecondVariation:
     def _find_constrained(self, number: float, antisymmetric_about: str | None) -> np.ndarray:
         """Return the local numbers of the constrained unknowns of modes, with ghosts.
 
-        A boundary or node that is constrained in r and in z is also constrained round the axis. Examples are a clamped
-        rim, a fixed node, a face with prescribed displacement.
-
-        Args:
-            number: circumferential wave number; in plane strain the wave number along the depth.
-            antisymmetric_about: name of the symmetry plane about which the modes are antisymmetric, or None.
+        A boundary or node that is constrained in r and in z, such as a clamped rim or a fixed node, is also constrained
+        round the axis.
         """
         problem, constrained, supports = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, scene_item in enumerate(problem.scene.items):
@@ -359,15 +317,10 @@ class SecondVariation:
         return np.flatnonzero(marks).astype(np.int32)
 
     def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
-        """Yield the row of each constraint of a mean displacement, and the row to be subtracted from it for one wave.
+        """Yield (item number, row of each constraint of a mean displacement, row to subtract from it for one wave).
 
-        A support that constrains the mean radial and axial displacement also constrains the mean hoop displacement V.
-        The third unknown is V, but V + U for modes of one wave round the axis, with the radial displacement U. For one
-        wave U is therefore subtracted from the row of the hoop displacement.
-
-        Yields:
-            Number of the support among the items of the scene; row of the constraint; row to be subtracted from it for
-            one wave. Both have the shape (locally owned unknowns,). The second is 0 for radial and axial displacements.
+        Both rows have the owned unknowns. A mean radial and axial constraint also fixes the mean V; the third unknown
+        is V + U for one wave, so U is subtracted.
         """
         forms, problem = self._forms, self.problem
         n = problem.n_owned
@@ -386,12 +339,7 @@ class SecondVariation:
     def _contact_stiffness(self, contact: Any, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the unknowns, shape (n, k), and stiffness matrices, shape (n, k, k), of the n points of a contact.
 
-        The k unknowns of a point are the radial and axial amplitudes U, W of its nodes, then their third unknowns.
-
-        Args:
-            contact: the contact face of the problem.
-            fields: locally owned unknowns of the problem.
-            m: 1 for modes of one wave round the axis, else 0. The third unknown is V + m U with the hoop amplitude V.
+        The k unknowns of a point are U and W of its nodes, then their third unknowns V + m U.
         """
         plane, turn = contact.mode_stiffness(fields, self.problem.control)
         dofs = self._to_mode[contact.rule.dofs]
@@ -404,17 +352,10 @@ class SecondVariation:
         return np.column_stack([dofs, self._V_of[dofs[:, ::2]]]), values
 
     def _guided_stiffness(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return the stiffness added by the support forces of n nodes that are fixed in r, but free round the axis.
+        """Return unknowns (n, 3) and stiffness matrices (n, 3, 3) from support forces f of nodes fixed in r alone.
 
-        Such a node moves along a circle about the axis. A hoop displacement V therefore moves it inwards by V^2/(2 r),
-        against the outward force f of the support. The second variation of the energy by V is -f V^2/r.
-
-        Args:
-            fields: locally owned unknowns of the problem.
-            m: 1 for modes of one wave round the axis, else 0. The third unknown is V + m U with the radial amplitude U.
-
-        Returns:
-            Unknowns of the nodes (radial, axial, third), shape (n, 3); stiffness matrices, shape (n, 3, 3).
+        A hoop displacement V moves such a node along a circle, inwards by V^2/(2 r), so the second variation is -f
+        V^2/r. The third unknown is V + m U.
         """
         r = self._X[:, 0] + self._forms.length * fields[self._old[:, 0]]
         constrained = np.zeros(len(self._V_of), dtype=bool)

@@ -14,15 +14,7 @@ _STEEPNESS = 0.1
 
 
 def draw(point: Any, file: Any, scale: float | None) -> None:
-    """Draw the deformed body with a buckling mode to a PNG file; collective.
-
-    The colour is the radial amplitude, or the axial one where the radial is much smaller: red for positive values.
-
-    Args:
-        point: the `CriticalPoint` with the mode.
-        file: path of the PNG file.
-        scale: largest displacement of the mode over the size of the body; None: 0.15, or less for short waves.
-    """
+    """Draw the deformed body with a buckling mode, coloured by its larger amplitude, to a PNG file; collective."""
     file = files.named("CriticalPoint.view3d", file, ".png")
     scale = None if scale is None else positive("CriticalPoint.view3d: scale", scale)
     lines, comm = _outline(point), point.path.problem.comm
@@ -30,16 +22,9 @@ def draw(point: Any, file: Any, scale: float | None) -> None:
 
 
 def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return the deformed outline of a body, boundary by boundary, and the buckling mode along it; collective.
+    """Return for each boundary deformed positions (m, 2), length, and amplitudes U, W, V (m, 3); collective.
 
     The axis of an axisymmetric body is left out.
-
-    Args:
-        point: the `CriticalPoint` with the mode.
-
-    Returns:
-        For each boundary with m points: deformed positions, shape (m, 2), length; amplitudes U, W, V of the radial,
-        axial and hoop displacement of the mode, shape (m, 3), dimensionless.
     """
     path, state = point.path, point.state
     segment = path.segment(point.left)
@@ -60,12 +45,8 @@ def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
 def _draw(point: Any, lines: list, file: Any, scale: float | None) -> None:
     """Draw the surface that the outlines sweep round the axis, or along the depth in plane strain, to a PNG file.
 
-    Args:
-        point: the `CriticalPoint` with the mode.
-        lines: (deformed positions, amplitudes U, W, V of the mode) at the m points of each boundary, shape (m, 2),
-            length, and shape (m, 3), dimensionless.
-        file: path of the PNG file.
-        scale: largest displacement of the mode over the size of the body; None: 0.15, or less for short waves.
+    Lines are (positions (m, 2), amplitudes (m, 3)); `scale` is the largest mode displacement over the body size, None
+    for at most 0.15.
     """
     pyvista = figures.pyvista()
     axisymmetric = point.path.problem.scene.kinematics.axisymmetric

@@ -240,8 +240,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
 def _press(scene: Scene, travel: float, step: StepControl) -> tuple[Path, str]:
     """Return the path of a neck that moves by `travel` (length), and the reason why it ended before, or "".
 
-    Raises:
-        ConvergenceError: the run failed before its second state.
+    A run that fails before its second state raises a ConvergenceError.
     """
     try:
         return trace(scene, until=travel_to(travel), progress=False, step=step), ""
