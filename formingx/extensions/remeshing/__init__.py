@@ -11,13 +11,7 @@ from .state_transfer import StateTransfer
 
 
 def _load(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
-    """Return the problem on the next mesh of a remeshed run, from a checkpoint.
-
-    Args:
-        problem: the problem on the previous mesh.
-        last: the last state on the previous mesh.
-        data: data of the next mesh in the checkpoint, the result of `files.save`.
-    """
+    """Return the problem on the next mesh of a remeshed run, from the data of `files.save` in a checkpoint."""
     return files.load((problem, last), data, StateTransfer)
 
 

@@ -37,16 +37,7 @@ class ContactState(NamedTuple):
 
     @classmethod
     def of(cls, face: FaceContact, fields: np.ndarray, control: float) -> ContactState:
-        """Return the contact state of a face in the present state of the old mesh.
-
-        Args:
-            face: the face on the old mesh.
-            fields: locally owned unknowns of the problem on the old mesh, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-
-        Returns:
-            The contact state.
-        """
+        """Return the contact state of a face at a control, for the unknowns of the old mesh, shape (n,)."""
         found, rule, x = face.tractions(fields, control), face.rule, face.positions(fields, control)
         assert isinstance(rule, Lobatto)
         share = np.divide(rule.area, rule.lumped, out=np.zeros_like(rule.area), where=rule.has_area)
@@ -61,18 +52,10 @@ class ContactState(NamedTuple):
         return cls(x, d, touches, traction, pairs, slip)
 
     def outward_motion(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
-        """Return the distances by which points of a new mesh must move out of the tool, to the depth of the old face.
+        """Return the outward motions of new points from signed gaps d, shape (n,), to the depth of the old face.
 
-        Between two old points in contact this depth is interpolated. Elsewhere points in the tool move to its surface,
-        or to the depth of an old neighbour in contact.
-
-        Args:
-            x: positions of the new points in the frame of the tool, shape (n, 2), length.
-            d: signed distances of the new points from the tool, positive inside, shape (n,), length.
-
-        Returns:
-            Distances along the outward normal of the tool, shape (n,), length. A negative distance is a motion into
-            the tool.
+        Between old contact points the depth is interpolated; elsewhere points move to the surface or an old neighbour's
+        depth. Negative is into the tool, length.
         """
         pair, share = self._nearest_pairs(x)
         both = self.touches[pair]
@@ -81,27 +64,13 @@ class ContactState(NamedTuple):
         return np.where(both.all(1), d - depth, np.maximum(d - np.maximum(depth, 0.0), 0.0))
 
     def tractions_at(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Interpolate the tractions of the old face at points of a new one.
-
-        Args:
-            x: positions of the new points in the frame of the tool, shape (n, 2), length.
-
-        Returns:
-            Pressure and friction, stress, and mask of the points between two old points in contact, shape (n,) each.
-        """
+        """Return pressure, friction and mask of points between old contact points, shape (n,) each, at x, (n, 2)."""
         pair, share = self._nearest_pairs(x)
         found = _interpolated(self.traction[pair], share[:, None])
         return found[:, 0], found[:, 1], self.touches[pair].all(1)
 
     def _nearest_pairs(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the pair of neighbouring points on the old face between which each of n new points lies.
-
-        Args:
-            x: positions of the new points in the frame of the tool, shape (n, 2), length.
-
-        Returns:
-            Numbers of the two old points, shape (n, 2); position between them, from 0 to 1, shape (n,).
-        """
+        """Return the pairs of old points, shape (n, 2), between which x lies, and positions from 0 to 1, (n,)."""
         a, b = np.moveaxis(self.position[self.pairs], 1, 0)
         offset = x[:, None] - a
         share = np.clip(np.einsum("nmi,mi->nm", offset, b - a) / np.einsum("mi,mi->m", b - a, b - a), 0.0, 1.0)
@@ -110,15 +79,9 @@ class ContactState(NamedTuple):
 
 
 def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, control: float) -> None:
-    """Transfer the pressure and friction per present area of a face on the old mesh to the same face on the new mesh.
+    """Transfer the pressure and friction per present area of a face to the same face on the new mesh, in place.
 
     The distance of each contact point is offset, so that the contact law gives this pressure at any depth in the tool.
-
-    Args:
-        face: the face on the new mesh, changed in place.
-        old: contact state of the face on the old mesh.
-        fields: locally owned unknowns of the new problem.
-        control: load parameter (control) of the state, dimensionless.
     """
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)
@@ -143,13 +106,5 @@ def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, c
 
 
 def _interpolated(values: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Interpolate linearly between the two values of each of n pairs.
-
-    Args:
-        values: values of the pairs, shape (n, 2) or (n, 2, k).
-        share: positions between the first value (0) and the second (1), shape (n,) or (n, 1).
-
-    Returns:
-        Interpolated values, shape (n,) or (n, k).
-    """
+    """Interpolate pairs of values, shape (n, 2) or (n, 2, k), linearly at `share` from 0 to 1, shape (n,) or (n, 1)."""
     return values[:, 0] + share * (values[:, 1] - values[:, 0])

@@ -27,10 +27,6 @@ _CANDIDATES = 4
 class MaterialPointProbe(Probe):
     """Probe of the displacement of material points since the start of a remeshed run.
 
-    Args:
-        problem: the `Problem` on the present mesh.
-        points: positions (R, Z) of the points on the first mesh, shape (n, 2), length.
-
     Attributes:
         points: positions (R, Z) of the points on the first mesh, shape (n, 2), length.
         earlier_displacement: displacement of the points from the first to the present mesh, shape (n, 2), length.
@@ -47,16 +43,9 @@ class MaterialPointProbe(Probe):
 
 
 def original_positions(state_transfer: Any, points: np.ndarray) -> np.ndarray:
-    """Map points of a new mesh back to their positions on the first mesh of the run.
+    """Map points of a new mesh, shape (n, 2), length, back to their positions on the first mesh of the run.
 
     They are interpolated from the nodes of the old mesh, in the deformed body.
-
-    Args:
-        state_transfer: the `StateTransfer` of the new mesh.
-        points: positions on the new mesh, shape (n, 2), length.
-
-    Returns:
-        Positions on the first mesh, shape (n, 2), length.
     """
     old, state = state_transfer.before
     nodes = node_positions(old.forms.domain)
@@ -66,17 +55,9 @@ def original_positions(state_transfer: Any, points: np.ndarray) -> np.ndarray:
 
 
 def scene_on_new_mesh(mesh: Any, state_transfer: Any) -> Any:
-    """Return a scene on a new mesh of the deformed body, with the items of the scene on the old mesh.
+    """Return a scene on a new mesh of the deformed body, with materials and items of `StateTransfer.before`.
 
-    The old scene is the scene of `StateTransfer.before`. Its materials, loads, supports and contacts are kept. The last
-    temperature on the old mesh becomes the initial one.
-
-    Args:
-        mesh: the new mesh.
-        state_transfer: the `StateTransfer` of the new mesh.
-
-    Returns:
-        The scene.
+    The last temperature on the old mesh becomes the initial one.
     """
     old, state = state_transfer.before
     if old.temperature is None:
@@ -90,15 +71,7 @@ def scene_on_new_mesh(mesh: Any, state_transfer: Any) -> Any:
 
 
 def followed(problem: Any, points: np.ndarray) -> np.ndarray:
-    """Map points of the first mesh of a run to their positions on the mesh of a problem.
-
-    Args:
-        problem: the `Problem`.
-        points: positions on the first mesh, shape (n, 2), length.
-
-    Returns:
-        Positions on the mesh of the problem, shape (n, 2), length.
-    """
+    """Map points of the first mesh of a run, shape (n, 2), length, to their positions on the mesh of a problem."""
     if problem.scene.state_transfer is None:
         return points
     old, state = problem.scene.state_transfer.before
@@ -107,11 +80,7 @@ def followed(problem: Any, points: np.ndarray) -> np.ndarray:
 
 
 class _OutlineProjection:
-    """Projection of points outside or near the outline of a mesh onto this outline.
-
-    Args:
-        problem: the `Problem` on the mesh.
-    """
+    """Projection of points outside or near the outline of a mesh onto this outline."""
 
     def __init__(self, problem: Any):
         outline = Outline(problem.forms)
@@ -144,11 +113,7 @@ class _OutlineProjection:
     def _closest(self, x: np.ndarray, edge: np.ndarray, s: np.ndarray, fixed: bool = False) -> tuple[np.ndarray, ...]:
         """Return the closest points on given edges: parameter, shape (n, 1), offset and outer normal, shape (n, 2).
 
-        Args:
-            x: positions, shape (n, 2), length.
-            edge: number of an edge for each position, shape (n,).
-            s: first guesses of the parameters, 0 at the start of an edge and 1 at its end, shape (n,).
-            fixed: True to keep the parameters.
+        x has shape (n, 2), length; guesses s go from 0 at the start of an edge to 1, and are kept if `fixed`.
         """
         a, b, middle = np.moveaxis(self._edges[edge], 1, 0)
         s, bend = s[:, None], 2 * (a + b - 2 * middle)
@@ -162,12 +127,5 @@ class _OutlineProjection:
 
 
 def _points_on_edges(a: np.ndarray, b: np.ndarray, middle: np.ndarray, s: np.ndarray) -> np.ndarray:
-    """Return one point on each of n parabolic edges, shape (n, 2), length.
-
-    Args:
-        a: first ends of the edges, shape (n, 2), length.
-        b: second ends, shape (n, 2), length.
-        middle: midpoints, shape (n, 2), length.
-        s: parameters of the points, 0 at a and 1 at b, shape (n, 1).
-    """
+    """Return points (n, 2) at s (n, 1), 0 at a to 1 at b, on parabolic edges with ends and midpoints (n, 2)."""
     return (1 - s) * (1 - 2 * s) * a + s * (2 * s - 1) * b + 4 * s * (1 - s) * middle

@@ -16,15 +16,9 @@ from .earlier_meshes import scene_on_new_mesh
 
 
 def save(problem: Any) -> dict[str, Any]:
-    """Return data for a checkpoint, from which `load` makes a problem on a mesh of a remeshed run; on one rank.
+    """Return the data of a checkpoint of a mesh of a remeshed run, from which `load` makes a problem; on one rank.
 
     Nodes and cells keep the order in which the mesh was made.
-
-    Args:
-        problem: the `Problem`.
-
-    Returns:
-        Dictionary of numbers, text and arrays: mesh, transferred deformation, offsets of contact distances.
     """
     mesh = problem.scene.mesh
     grid, nodes = gathered(mesh), np.asarray(mesh.domain.geometry.input_global_indices, dtype=np.int64)
@@ -40,18 +34,9 @@ def save(problem: Any) -> dict[str, Any]:
 
 
 def load(before: tuple[Problem, State], data: dict[str, Any], state_transfer: Callable[..., Any]) -> Problem:
-    """Return the problem on a mesh that was made during a run, from its stored data.
+    """Return the problem on a mesh that was made during a run, from its data and (problem, last state) before it.
 
-    Args:
-        before: the problem on the previous mesh, and the last state on it.
-        data: result of `save`.
-        state_transfer: the class `StateTransfer`, called with the stored fields.
-
-    Returns:
-        The problem.
-
-    Raises:
-        InputError: several ranks, or a mesh that gets another numbering than in the run.
+    Several ranks, or a mesh that gets another numbering than in the run, are an InputError.
     """
     scene = before[0].scene
     if scene.mesh.comm.size > 1:

@@ -22,26 +22,10 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
              outside: Callable[[np.ndarray, frozenset[str]], np.ndarray] = lambda points, names: points) -> Mesh:
     """Return a mesh of six-node triangles inside an outline, with second-order geometry along it; on one rank.
 
-    Args:
-        edges: edges of the outline in counter-clockwise order, each beginning at the end of the last: first end, second
-            end, midpoint, shape (m, 3, 2), length.
-        names: for each edge, the names of the boundaries it belongs to.
-        corners: positions of small elements, shape (k, 2), length.
-        size: element size away from the corners, length.
-        corner: element size at the corners, length.
-        layer: name of the only layer.
-        axisymmetric: True for a body of revolution.
-        comm: MPI communicator.
-        volume: volume of revolution, or area in plane strain, which the mesh gets by a scaling of R; default: the
-            volume inside the outline.
-        outside: function of new outline points, shape (n, 2), length, and the names of the boundaries that all of them
-            belong to. It returns the points moved out of the tools.
-
-    Returns:
-        The mesh.
-
-    Raises:
-        InputError: the outline of the new elements crosses itself, or gmsh made no mesh.
+    Edges, in counter-clockwise order, have first end, second end and midpoint, shape (m, 3, 2), length, each with the
+    `names` of its boundaries. Elements have `size`, and `corner` at the positions `corners`, shape (k, 2). R is scaled
+    to give `volume` (length^3, or length^2 in plane strain). `outside` moves new outline points, shape (n, 2), out of
+    tools. A crossing outline, or no mesh by gmsh, is an InputError.
     """
     turns = [k for k in range(len(edges)) if names[k] != names[k - 1] or (corners == edges[k, 0]).all(1).any()] or [0]
     ends, middles, named = [], [], []
@@ -105,15 +89,9 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
 
 
 def enclosed_volume(edges: np.ndarray, axisymmetric: bool) -> float:
-    """Return the volume of revolution, or the area, inside a closed outline of parabolas; exact.
+    """Return the exact volume of revolution, length^3, or area, inside a closed outline of parabolic edges.
 
-    Args:
-        edges: edges of the outline in counter-clockwise order: first end, second end, midpoint, shape (m, 3, 2),
-            length.
-        axisymmetric: True for the volume of revolution, False for the area.
-
-    Returns:
-        Volume, length^3, or area, length^2.
+    Edges have first end, second end and midpoint, in counter-clockwise order, shape (m, 3, 2), length.
     """
     xi, weights = np.polynomial.legendre.leggauss(4)
     s = (1 + xi) / 2
@@ -126,13 +104,8 @@ def enclosed_volume(edges: np.ndarray, axisymmetric: bool) -> float:
 def without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.ndarray:
     """Return the edges of the outline, shape (m, 3, 2), with shallow pockets between body and tool closed.
 
-    Nodes between two contact nodes are moved onto the line of these two if all are within `depth` of it. A side that
-    rolls onto a plate may leave such a node in a crease.
-
-    Args:
-        edges: edges in order: first end, second end, midpoint, shape (m, 3, 2), length.
-        touched: positions of the contact nodes, shape (k, 2), length.
-        depth: largest depth of a pocket, length.
+    Nodes between two contact nodes, `touched` (k, 2), move onto the line of these if all are within `depth` of it,
+    length.
     """
     nodes, n = edges[:, [0, 2]].reshape(-1, 2).copy(), 2 * len(edges)
     close = 1e-6 * np.ptp(nodes, axis=0).max()
@@ -149,12 +122,8 @@ def refined_points(edges: np.ndarray, names: list[frozenset[str]],
                     touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
     """Return the points of the outline that get small elements, shape (k, 2), length.
 
-    These are the corners between two boundaries that have contacts, and the ends of contact areas.
-
-    Args:
-        edges: edges in order: first end, second end, midpoint, shape (m, 3, 2), length.
-        names: names of the boundaries of each edge.
-        touched: (boundary, positions of its nodes in contact, shape (n, 2), length) of each contact.
+    These are the corners between two boundaries with contacts, and the ends of contact areas: `touched` has (boundary,
+    positions (n, 2)) of each contact.
     """
     faces = {on for on, _ in touched}
     found = []
@@ -173,11 +142,8 @@ def refined_points(edges: np.ndarray, names: list[frozenset[str]],
 def _nodes_along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes of new elements along a line of edges: ends, shape (n + 1, 2), and midpoints, shape (n, 2).
 
-    Args:
-        edges: edges of the line in order: first end, second end, midpoint, shape (m, 3, 2), length.
-        corners: positions of small elements, shape (k, 2), length.
-        size: element size away from the corners, length.
-        corner: element size at the corners, length.
+    Edges have shape (m, 3, 2); elements have `size`, and the size `corner` at the positions `corners`, shape (k, 2),
+    length.
     """
     parameter = np.linspace(0, len(edges), FINE_PIECES * len(edges) + 1)
 

@@ -153,17 +153,10 @@ def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
 
 def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
                         done: Callable[[], bool]) -> None:
-    """Continue a run to its end, with a new mesh whenever the elements are too distorted.
+    """Continue a run to its end, with a new mesh whenever the elements are too distorted; path in place.
 
-    Args:
-        path: the path, extended in place.
-        remesh: criterion and sizes.
-        tolerances: tolerances of the states.
-        part: function that continues the run on the last mesh, to its end or until a new mesh is needed.
-        done: function that returns True if the path is complete.
-
-    Raises:
-        ConvergenceError: the end of the path was not reached.
+    `part` runs on the last mesh until its end; `done` is True for a complete path. Otherwise a ConvergenceError is
+    raised.
     """
     record = path.record
     record.hooks.on_state.append(lambda state: _check_mesh(record, state, remesh))
@@ -207,13 +200,7 @@ def _not_reached(record: Record, error: ConvergenceError) -> ConvergenceError:
 def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
     """Remesh the body in the last state of a path, and add the first state on the new mesh to it, in equilibrium.
 
-    Args:
-        path: the path, extended in place.
-        remesh: criterion and sizes.
-        tolerances: tolerances of the state.
-
-    Raises:
-        ConvergenceError: no new mesh has an equilibrium.
+    If no new mesh has an equilibrium, a ConvergenceError is raised.
     """
     record, last = path.record, path.last
     stepping = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
@@ -239,17 +226,8 @@ def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
 def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
     """Return a new segment of a path: a new mesh of the body in its last state, and the equilibrium on it.
 
-    A segment of a path has the states on one mesh. Several element sizes near the requested one are tried. The first
-    mesh on which J is far from the limits `Remesh.volume_ratio` is taken. If there is none, the mesh on which J is
-    furthest from them is taken. J is the determinant of the deformation gradient from the new mesh.
-
-    Args:
-        path: the path.
-        remesh: criterion and sizes.
-        tolerances: tolerances of Newton's method for the equilibrium on the new mesh.
-
-    Raises:
-        ConvergenceError: no mesh has an equilibrium.
+    Several element sizes are tried. The first mesh, else the best, on which J is far from the limits
+    `Remesh.volume_ratio` is taken. None in equilibrium raises a ConvergenceError.
     """
     low, high = remesh.volume_ratio
     found, reason = [], ""
@@ -279,16 +257,10 @@ def _volume_ratios(record: Record, state: State) -> tuple[float, float]:
 
 
 def _check_mesh(record: Record, state: State, remesh: Remesh) -> None:
-    """End the run on the present mesh if its elements are too distorted in a new state, so that it is remeshed.
+    """End the run on the present mesh if J, the volume ratio since it was made, leaves `Remesh.volume_ratio`.
 
-    They are too distorted if J, the volume ratio since the mesh was made, leaves `Remesh.volume_ratio`. In the first
-    state on a new mesh (kind "remesh") the relative changes of force and strain energy by the new mesh are stored
-    instead, in `State.jump`.
-
-    Args:
-        record: record of the run.
-        state: its new state.
-        remesh: criterion and sizes.
+    In the first state on a new mesh (kind "remesh") the relative changes of force and strain energy are stored in
+    `State.jump`.
     """
     if state.kind == "remesh":
         before = record.segments[-2].states[-1].measures
@@ -312,11 +284,7 @@ def _needs_remeshing(record: Record, state: State, remesh: Remesh) -> bool:
 def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
     """Return a new segment of a path: a new mesh of the body in its last state, and the equilibrium on it.
 
-    Args:
-        path: the path.
-        remesh: criterion and sizes.
-        tolerances: tolerances of Newton's method for the equilibrium on the new mesh.
-        share: element size over the requested size.
+    `share` is the element size over the requested size.
     """
     record, old, state = path.record, path.problem, path.last
     scene = old.scene
@@ -361,13 +329,10 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
 
 
 def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
-    """Return the unknowns in equilibrium at a control, from the transferred unknowns x on a new mesh.
+    """Return the unknowns in equilibrium at a control, from the transferred unknowns x, shape (n,), on a new mesh.
 
-    Newton's method is tried first. If it fails, the unbalanced forces are applied as loads and reduced to zero along
-    `curve`, a path at constant control.
-
-    Raises:
-        ConvergenceError: no equilibrium was found.
+    Newton's method is tried first; then the unbalanced forces are reduced to zero as loads along `curve`. Failing both
+    is a ConvergenceError.
     """
     first = problem.setting
     problem.x.array_w[:] = x
@@ -395,14 +360,9 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
 
 def _moved_out_of_tools(x: np.ndarray, names: frozenset[str],
                         contacts: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
-    """Return new outline points moved out of the tools, to the penetration depth of the old contact points beside them.
+    """Return outline points x, shape (n, 2), moved out of tools to the depth of the old points beside them.
 
-    New edges cut corners of the old outline, so points on them may lie in a tool.
-
-    Args:
-        x: positions of the new points, shape (n, 2), length.
-        names: names of the boundaries that all of these points belong to.
-        contacts: (contact on the old mesh, contact state, travel of the tool, shape (2,), length) of each contact.
+    Contacts are (contact, contact state, travel of the tool (2,), length) of the boundaries `names`.
     """
     for contact, before, travel in contacts:
         if contact.contact.on in names:

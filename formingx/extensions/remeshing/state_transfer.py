@@ -68,15 +68,7 @@ class StateTransfer(NamedTuple):
 
     @classmethod
     def of(cls, problem: Any, state: Any) -> StateTransfer:
-        """Return the positions, deformations and pressures of the body in a state, for a new mesh of it.
-
-        Args:
-            problem: the `Problem` on the old mesh.
-            state: the last state on it.
-
-        Returns:
-            The data.
-        """
+        """Return the positions, deformations and pressures of the body in a state, for a new mesh of it."""
         forms = problem.forms
         with problem.state_context(state):
             both = in_own_cells(forms.domain, ufl.as_vector([*(forms.X + forms.u), *forms.X]), _LOCAL_NODES)
@@ -92,60 +84,23 @@ class StateTransfer(NamedTuple):
         return cls(x, reference, b, pressures, stiffness, (problem, state))
 
     def followed(self, problem: Any, points: np.ndarray) -> np.ndarray:
-        """Map points of the first mesh of the run to their positions on the new mesh.
-
-        Args:
-            problem: the `Problem` on the new mesh.
-            points: positions on the first mesh, shape (n, 2), length.
-
-        Returns:
-            Positions on the new mesh, shape (n, 2), length.
-        """
+        """Map points of the first mesh of the run, shape (n, 2), length, to their positions on the new mesh."""
         return followed(problem, points)
 
     def probe(self, problem: Any, points: np.ndarray) -> MaterialPointProbe:
-        """Return a probe of the displacement since the start of the run, at points of the first mesh.
-
-        Args:
-            problem: the `Problem` on the new mesh.
-            points: positions on the first mesh, shape (n, 2), length.
-
-        Returns:
-            The probe.
-        """
+        """Return a probe of the displacement since the start of the run at points of the first mesh, shape (n, 2)."""
         return MaterialPointProbe(problem, points)
 
     def save(self, problem: Any) -> dict[str, Any]:
-        """Return the data of a checkpoint from which the problem on the new mesh can be made again.
-
-        Args:
-            problem: the `Problem` on the new mesh.
-
-        Returns:
-            Plain data.
-        """
+        """Return the data of a checkpoint from which the problem on the new mesh can be made again."""
         return save(problem)
 
     def original_positions(self, points: np.ndarray) -> np.ndarray:
-        """Map points of the new mesh back to their positions on the first mesh of the run.
-
-        Args:
-            points: positions on the new mesh, shape (n, 2), length.
-
-        Returns:
-            Positions on the first mesh, shape (n, 2), length.
-        """
+        """Map points of the new mesh, shape (n, 2), length, to their positions on the first mesh of the run."""
         return original_positions(self, points)
 
     def gradient(self, forms: Any) -> tuple[Any, Any]:
-        """Return the deformation gradient from the start of the run to the new mesh, on the elements of the new mesh.
-
-        Args:
-            forms: the `Formulation` on the new mesh.
-
-        Returns:
-            F_old (UFL, shape (3, 3)) and its determinant det F_old (UFL scalar).
-        """
+        """Return F_old (UFL, (3, 3)) from the start of the run to the new mesh, on its elements, and det F_old."""
         space = fem.functionspace(forms.domain, ("DG", 2, (6,)))
         field, values = fem.Function(space), self._projected_fields(forms)[0]
         field.x.array.reshape(-1, 6)[space.dofmap.list[: len(values)]] = values
@@ -156,14 +111,7 @@ class StateTransfer(NamedTuple):
         return ufl.as_tensor(F), area * ufl.sqrt(hoop)
 
     def unknowns(self, problem: Any) -> np.ndarray:
-        """Return the initial unknowns on the new mesh: zero displacements, and transferred pressure fields.
-
-        Args:
-            problem: the `Problem` on the new mesh.
-
-        Returns:
-            Locally owned entries of `Problem.x`, shape (n,).
-        """
+        """Return the initial unknowns, shape (n,): zero displacements and transferred pressure fields."""
         x, forms = np.zeros(problem.x.getLocalSize()), problem.forms
         values, fitted = np.zeros(len(forms.w.x.array)), self._projected_fields(forms)[1]
         for k in range(fitted.shape[2]):
@@ -172,15 +120,10 @@ class StateTransfer(NamedTuple):
         return x
 
     def _projected_fields(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deformation and the pressures of the body in the cells of the new mesh, by least squares in each.
+        """Return deformation (cells, 6, 6) and pressures (cells, 3, p) in new cells, by least squares in each.
 
-        Returns:
-            Deformation b = F F^T/J from the start of the run to the new mesh, at corners and midpoints, shape (cells,
-            6, 6). The last axis has rr, rz, zz and hoop entry of b, then cosine and sine of the rotation of F. Pressure
-            unknowns of the model at the corners, shape (cells, 3, p), dimensionless.
-
-        Args:
-            forms: the `Formulation` on the new mesh.
+        At corners and midpoints the deformation has rr, rz, zz and hoop entry of b = F F^T/J, cosine and sine of the
+        rotation of F. Pressures, at corners, are dimensionless.
         """
         rule: Any = basix.make_quadrature(basix.CellType.triangle, _QUADRATURE_DEGREE)
         xi, weights = rule
@@ -195,10 +138,7 @@ class StateTransfer(NamedTuple):
         weights = sampled[..., -1] * weights
 
         def nearest(values: np.ndarray, shapes: np.ndarray) -> np.ndarray:
-            """Return the nodal values that fit values at quadrature points best, shape (cells, nodes, k).
-
-            values: shape (cells, points, k). shapes: shape functions of the nodes at the points, shape (points, nodes).
-            """
+            """Return nodal values (cells, nodes, k) that fit values (cells, points, k) best by shape functions."""
             mass = np.einsum("cq,qi,qj->cij", weights, shapes, shapes)
             return np.linalg.solve(mass, np.einsum("cq,qi,cqk->cik", weights, shapes, values))
         mean = np.einsum("cq,cqk->ck", weights, b) / weights.sum(1)[:, None]
@@ -207,15 +147,9 @@ class StateTransfer(NamedTuple):
 
     def _deformation_at(self, cells: np.ndarray, coordinates: np.ndarray,
                         axisymmetric: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Return the deformation b = F F^T/J at points of the deformed old mesh, and J since the start of that mesh.
+        """Return b = F F^T/J with cosine and sine of the rotation of F, shape (n, 6), and J of old cells, shape (n,).
 
-        Args:
-            cells: old cell of each point, shape (n,).
-            coordinates: local coordinates of the points in their cells, shape (n, 2).
-            axisymmetric: True for a body of revolution.
-
-        Returns:
-            Entries rr, rz, zz and hoop entry of b, cosine and sine of the rotation of F, shape (n, 6); J, shape (n,).
+        The four entries rr, rz, zz and hoop of b come first. Points have local coordinates, shape (n, 2).
         """
         x, reference, (shapes, *slopes) = self.x[cells], self.reference[cells], _tabulated(_POSITIONS, coordinates, 1)
         grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, reference))
@@ -231,16 +165,10 @@ class StateTransfer(NamedTuple):
         return np.concatenate([b / J, turn / np.linalg.norm(turn, axis=0)]).T, J
 
     def _find_cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Find the cells of the deformed old mesh in which n points lie.
+        """Return the old cells, shape (n,), in which points (n, 2) of the deformed body lie, and local coordinates.
 
-        Newton's method is used in the cells nearest to a point. New edges cut corners of old ones: a point outside the
-        body is placed on the edge of the nearest element.
-
-        Args:
-            points: positions of the points in the deformed body, shape (n, 2), length.
-
-        Returns:
-            Numbers of the cells, shape (n,); local coordinates of the points in them, shape (n, 2).
+        Newton's method is used in the nearest cells. A point outside the body is placed on the edge of the nearest
+        element.
         """
         from scipy.spatial import cKDTree
         inside = 0.9 * _LATTICE + 0.1 / 3
@@ -267,16 +195,7 @@ class StateTransfer(NamedTuple):
 
 
 def _tabulated(element: Any, xi: np.ndarray, derivatives: int = 0) -> np.ndarray:
-    """Return the shape functions of an element at points of a triangle, and their derivatives if asked for.
-
-    Args:
-        element: the Basix element.
-        xi: local coordinates of the points, shape (n, 2).
-        derivatives: 1 for functions and their two first derivatives, 0 for functions alone.
-
-    Returns:
-        Values, shape (1, n, functions), or (3, n, functions) with derivatives.
-    """
+    """Return shape functions at local points xi, (n, 2): shape (1 or 3, n, functions) with `derivatives` 0 or 1."""
     return np.asarray(element.tabulate(derivatives, xi)) if len(xi) else np.zeros((1 + 2 * derivatives, 0, element.dim))
 
 
@@ -284,16 +203,7 @@ def _left_stretch(rr: Any, rz: Any, zz: Any, along: Any, turned: Any,
                   sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
     """Return the left stretch V in the section (V^2 = b), cosine and sine of the rotation of F, and det V.
 
-    The deformation gradient in the section is F = V R, with a rotation R. Interpolated cosines and sines are no longer
-    of length 1, so they are divided by their length.
-
-    Args:
-        rr: entry rr of b.
-        rz: entry rz of b.
-        zz: entry zz of b.
-        along: interpolated cosine of the angle of R.
-        turned: interpolated sine of this angle.
-        sqrt: square root for numbers or for UFL.
+    The interpolated cosine (`along`) and sine (`turned`) are divided by their length; `sqrt` is that of numbers or UFL.
     """
     area = sqrt(rr * zz - rz * rz)
     trace, length = sqrt(rr + zz + 2 * area), sqrt(along**2 + turned**2)
@@ -302,15 +212,10 @@ def _left_stretch(rr: Any, rz: Any, zz: Any, along: Any, turned: Any,
 
 
 def _positive_definite(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
-    """Return quadratic fields of the deformation b = F F^T/J that are positive definite everywhere in their cells.
+    """Return fields b, shape (cells, 6, 6), that are positive definite everywhere in their cells.
 
-    A rapid rotation within an element, as beside a corner, can make them indefinite. Such fields are moved towards
-    their means as far as needed.
-
-    Args:
-        b: nodal values of the fields, shape (cells, 6 nodes, 6 entries). The entries are rr, rz, zz and hoop entry of
-            b, then cosine and sine of the rotation of F.
-        mean: mean values of the six entries, shape (cells, 6).
+    Where a rapid rotation makes them indefinite, they move towards their means, shape (cells, 6), as far as needed.
+    Entries: rr, rz, zz, hoop, cosine, sine.
     """
     mean = mean[:, None]
     deviation, shapes = b - mean, _tabulated(_QUADRATIC, _LATTICE)[0]
