@@ -187,16 +187,7 @@ class SoskeyWinter(Damping):
 def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: Any) -> tuple[Any, Any, Any]:
     """Return the damping h as a sum of exponentials f exp(-n s), and its derivatives dh/dI1 and dh/dI2.
 
-    The strain s is the square root of alpha I1 + (1 - alpha) I2 - 3.
-
-    Args:
-        alpha: share of I1, from 0 to 1.
-        terms: list of (f, n), one per exponential.
-        I1: trace of the Finger tensor B of the deformation since a past state, any shape.
-        I2: trace of the inverse of B, the same shape.
-
-    Returns:
-        h, dh/dI1 and dh/dI2, the same shape each.
+    The strain s is sqrt(alpha I1 + (1 - alpha) I2 - 3) with I1 = tr B, I2 = tr B^-1 of the Finger tensor B.
     """
     s = np.sqrt(np.maximum(alpha * I1 + (1 - alpha) * I2 - 3, 0))
     each = [f * np.exp(-n * s) for f, n in terms]

@@ -32,11 +32,8 @@ class MemoryIntegral:
     S is the second Piola-Kirchhoff stress up to a pressure, W_k the weight of past state k, h the damping function.
     Tensors at n points are stored as entries 11, 22, 12, 33, shape (4, n). Cbar = J^(-2/3) C.
 
-    Args:
-        spectrum: list of (G, tau), stress and time.
-        damping: a `Damping`, or None for h = 1.
-        irreversible: True if h of a past state never increases: its smallest value so far applies.
-        shifted: True if the reduced time of the material depends on the temperature.
+    `spectrum` is a list of (G, tau), stress and time; without a `damping`, h = 1. It is `irreversible` if h of a past
+    state never increases, and `shifted` if the reduced time depends on the temperature.
     """
 
     coefficients = {"past_S": (0.0,) * 4, "past_C": (1.0, 1.0, 0.0, 1.0), "past_D": ((0.0,) * 4,) * 4,
@@ -51,26 +48,13 @@ class MemoryIntegral:
         self.damping, self.irreversible, self.shifted = damping, irreversible, shifted
 
     def history(self, forms: Any, terms: Any) -> PastStates:
-        """Return the history variables of a material with this integral: its past states.
-
-        Args:
-            forms: the `Formulation`.
-            terms: the `MaterialTerms` of the material.
-
-        Returns:
-            The past states.
-        """
+        """Return the history variables of a material with this integral: its past states."""
         return PastStates(forms, terms)
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
-        """Return the weights w of K past states in the stress, for relaxation modes with the modulus 1 in place of G.
+        """Return the weights w of K past states in the stress for modes of modulus 1, shape (K, modes[, n]).
 
-        Args:
-            ages: ages of the states in reduced time, descending, the last 0, time. Shape (K,), or (K, n) if they differ
-                between n points.
-
-        Returns:
-            Weights, dimensionless, shape (K, modes) or (K, modes, n).
+        Ages in reduced time descend to 0, shape (K,), or (K, n) if they differ between n points.
         """
         x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
         step, young = x[:-1] - x[1:], np.exp(-x[1:])
@@ -89,22 +73,11 @@ class MemoryIntegral:
 
     def weights_after(self, weights: np.ndarray, step: Any, last_step: Any = 0.0,
                       allowed: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
-        """Return the weights W of K past states in the stress at the end of a step in reduced time.
+        """Return the weights W of K past states after a step in reduced time, stress, and their slopes by its length.
 
-        The stress is the sum of W h Cbar_k^-1 over the past states k, with the damping h and the isochoric right
-        Cauchy-Green tensor Cbar_k. The weights are exact if h Cbar_k^-1 is a parabola in time through the last two
-        states and the end of the step. So a step is of second order even if it is far longer than the relaxation times.
-
-        Args:
-            weights: result of `weights` at the start of the step, shape (K, modes) or (K, modes, n).
-            step: length of the step in reduced time, a number or, if it differs between n points, shape (n,).
-            last_step: length of the previous step in reduced time, a number or shape (n,). 0: no parabola is used, and
-                h Cbar_k^-1 is linear in the step.
-            allowed: 1 where a parabola is used, 0 at points where the last two states differ too much, shape (n,).
-
-        Returns:
-            Weights W, stress, and their derivatives by the length of the step, stress/time, shape (K, n) or (K, 1)
-            each.
+        The stress is the sum of W h Cbar_k^-1; results have shape (K, n) or (K, 1), the given weights (K, modes[, n]).
+        They are exact for a parabola of h Cbar_k^-1 in time, so long steps are of second order too. Steps are numbers
+        or (n,); without `last_step`, or where `allowed` is 0, it is linear.
         """
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
@@ -130,18 +103,10 @@ class MemoryIntegral:
 
     def inverses_and_damping(self, C: np.ndarray, past: np.ndarray,
                              smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
-        """Return the inverse tensors Cbar_k^-1 and the damping of K past states at n points.
+        """Return Cbar_k^-1 of K past states, shape (K, 4, n), damping h, and dh/dI1 and dh/dI2, shape (K, n) each.
 
-        Args:
-            C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
-            past: entries of Cbar in the past states, shape (K, 4, n).
-            smallest_h: smallest damping h that has applied to each past state so far: an upper bound of h, shape
-                (K, n). None: no bound.
-
-        Returns:
-            Entries of Cbar_k^-1, shape (K, 4, n). Damping h, a factor of the stress due to each past state, and its
-            derivatives by I1 and I2, shape (K, n) each. I1 and I2 are the traces of the Finger tensor of the
-            deformation since the past state, and of its inverse.
+        Tensors have the entries 11, 22, 12, 33: C (4, n), `past` (K, 4, n). `smallest_h`, shape (K, n), bounds h; None:
+        no bound.
         """
         inverse = _inverse(past)
         if self.damping is None:
@@ -157,19 +122,9 @@ class MemoryIntegral:
 
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
                smallest_h: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the second Piola-Kirchhoff stress from K past states at n points, without pressure, and its slopes.
+        """Return the stress S without pressure, shape (4, n), dS/dCbar, shape (4, 4, n), and dS/dt, shape (4, n).
 
-        Args:
-            C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C, shape (4, n).
-            past: entries of Cbar in the past states, shape (K, 4, n).
-            W: weights of the past states at the end of the step, shape (K, n) or (K, 1), stress.
-            slope: derivative of W by the length of this step in reduced time, shape of W, stress/time.
-            smallest_h: smallest damping h that has applied to each past state so far: an upper bound of h, shape
-                (K, n). None: no bound.
-
-        Returns:
-            Stress S, shape (4, n); dS/dCbar, shape (4, 4, n); derivative of S by the length of the step in reduced
-            time, shape (4, n).
+        C has shape (4, n), `past` (K, 4, n), W and its slope by t (K, n) or (K, 1), the bound of damping (K, n).
         """
         inverse, h, h1, h2 = self.inverses_and_damping(C, past, smallest_h)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
@@ -190,14 +145,7 @@ class MemoryIntegral:
         S is linearised about the state of the last refresh, with the isochoric right Cauchy-Green tensor Cbar_0 and the
         time step dt_0. There T = dS/dt and D = dS/dCbar, and S_0 is S - T dt_0. The present ones are Cbar and Delta t.
 
-        Args:
-            C: entries 11, 22, 12, 33 of Cbar (UFL).
-            coefficients: {name: UFL coefficient}: "past_S" for S_0, "past_C" for Cbar_0, "past_D" for D, "past_T" for
-                T.
-            time_step: present length Delta t of the step (UFL scalar, time).
-
-        Returns:
-            The potential (UFL, stress).
+        The coefficients (UFL) are "past_S" for S_0, "past_C" for Cbar_0, "past_D" for D and "past_T" for T.
         """
         S, D, T = (coefficients[name] for name in ("past_S", "past_D", "past_T"))
         change = _change(C, coefficients)
@@ -212,33 +160,19 @@ class MemoryIntegral:
         Cbar_0 is the isochoric right Cauchy-Green tensor at the last refresh, about which the stress S is linearised.
         There the work is 0.
 
-        Args:
-            C: entries 11, 22, 12, 33 of the present Cbar (UFL).
-            dC: virtual changes of these entries (UFL).
-            coefficients: {name: UFL coefficient}: "past_C" for Cbar_0, "past_D" for D.
-
-        Returns:
-            Virtual work per reference volume (UFL, stress).
+        The coefficients (UFL) are "past_C" for Cbar_0 and "past_D" for D; C and dC have the entries 11, 22, 12, 33.
         """
         D, change = coefficients["past_D"], _change(C, coefficients)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
 
 def _inverse(C: np.ndarray) -> np.ndarray:
-    """Return the entries 11, 22, 12, 33 of the inverses of tensors of determinant 1.
-
-    C: entries 11, 22, 12, 33 of the tensors at n points, shape (..., 4, n), as the result.
-    """
+    """Return the inverses of tensors of determinant 1, both as entries 11, 22, 12, 33, shape (..., 4, n)."""
     return np.stack(cofactor(entries(np.moveaxis(C, -2, 0))), axis=-2)
 
 
 def _change(C: Any, coefficients: dict[str, Any]) -> list[Any]:
-    """Return the change of the entries 11, 22, 12, 33 of Cbar = J^(-2/3) C since the stress was last linearised (UFL).
-
-    Args:
-        C: present entries of Cbar (UFL).
-        coefficients: {name: UFL coefficient}; "past_C" has the entries of Cbar at the last linearisation.
-    """
+    """Return the change of the entries 11, 22, 12, 33 of Cbar since the stress was last linearised (UFL)."""
     return [C[i] - coefficients["past_C"][i] for i in range(4)]
 
 
@@ -266,8 +200,7 @@ def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
     are f, f (1 + s) and f s. For s from 2 to 4 all three are reduced gradually to 0, since BDF2 is unstable for long
     steps.
 
-    Args:
-        s: length of the step over the length of the previous one, any shape.
+    s is the length of the step over the length of the previous one.
     """
     s = np.minimum(s, 4.0)
     share = np.minimum(1.0, 2 - s / 2) * s
@@ -275,25 +208,14 @@ def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
 
 
 def _parabola_factor_slopes(s: Any) -> tuple[Any, Any]:
-    """Return the derivatives by s of f (1 + s) and f s, the last two results of `_parabola_factors`.
-
-    They are the factors of the states at the start of a step and at the start of the previous step.
-
-    Args:
-        s: length of the step over the length of the previous one, any shape, as of the results.
-    """
+    """Return the derivatives by s of the last two results of `_parabola_factors`, shape of s each."""
     s = np.minimum(s, 4.0)
     share, slope = np.minimum(1.0, 2 - s / 2) * s, np.where(s < 2, 1.0, np.where(s < 4, 2 - s, 0.0))
     return slope, slope * s / (1 + s) + share / (1 + s) ** 2
 
 
 def _quadratic_weight(x: np.ndarray) -> np.ndarray:
-    """Return [x - 2 + (x + 2) e^-x]/x^2, by which the deviation of a parabola from its chord enters the stress.
-
-    It is the integral of t (1 - t) over a step, t from 0 to 1, with the memory function x exp(-x (1 - t)) as weight.
-
-    x: length of the step over the relaxation time, any shape, as of the result.
-    """
+    """Return [x - 2 + (x + 2) e^-x]/x^2, the weight of a parabola's deviation; x is step over relaxation time."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)

@@ -265,11 +265,7 @@ class KBKZ(RelaxingMaterial):
     def _true_stress(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
         """Return the true stress tau_1 - tau_3 of a test at the last of its times, without the equilibrium.
 
-        Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial".
-            times: times of the stretches, shape (n,).
-            stretches: stretches, shape (n,).
-            between: quantity with a constant rate between two times, "stretch" or "strain".
+        Times and stretches have shape (n,); `between` them, "stretch" or "strain" has a constant rate.
         """
         now, last = times[-1], stretches[-1]
         modulus, tau = np.array(self.spectrum).T
@@ -282,13 +278,9 @@ class KBKZ(RelaxingMaterial):
         return float(initial + np.sum(half * _WEIGHTS * memory * self._damped_difference(mode, relative)))
 
     def _panel_ends(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-        """Return the ends of the quadrature panels of the memory integral, as ages, ascending, shape (k,), time.
+        """Return the ends of the quadrature panels of the memory integral, as ascending ages, shape (k,), time.
 
-        An age is the time from an instant of the test to its last time.
-
-        Args:
-            times: times of the test, shape (n,).
-            stretches: stretches at these times, shape (n,).
+        An age is the time from an instant of the test to the last of its times, shape (n,).
         """
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANEL_AGE_RATIO)) + 1)
@@ -301,14 +293,7 @@ class KBKZ(RelaxingMaterial):
         return found[found <= whole]
 
     def _damped_difference(self, mode: str, stretch: np.ndarray) -> np.ndarray:
-        """Return h (B_11 - B_33) after a sudden stretch, dimensionless, with the shape of `stretch`.
-
-        B is the Finger tensor of the stretch, h its damping. Direction 1 is stretched, direction 3 is free of stress.
-
-        Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial".
-            stretch: stretch in direction 1, any shape.
-        """
+        """Return h (B_11 - B_33) after a sudden stretch with Finger tensor B, dimensionless, shape of `stretch`."""
         square = np.asarray(stretch, float)[..., None] ** (2 * np.array([1, MODES[mode], -1 - MODES[mode]]))
         difference = square[..., 0] - square[..., 2]
         return difference if self.damping is None else difference * self.damping(square.sum(-1), (1 / square).sum(-1))
@@ -323,14 +308,7 @@ class KBKZ(RelaxingMaterial):
 
 
 def _interpolated(t: np.ndarray, times: np.ndarray, stretches: np.ndarray, between: str) -> np.ndarray:
-    """Return the stretches of a test at times t, with the shape of t.
-
-    Args:
-        t: times at which the stretch is interpolated, any shape.
-        times: times of the test, shape (n,).
-        stretches: stretches at these times, shape (n,).
-        between: quantity that is linear between two times of the test, "stretch" or "strain" (logarithmic).
-    """
+    """Return the stretches at times t, any shape, of a test (n,) with linear "stretch" or logarithmic "strain"."""
     if between == "stretch":
         return np.interp(t, times, stretches)
     return np.exp(np.interp(t, times, np.log(stretches)))

@@ -55,10 +55,6 @@ class PastStates:
     """Past states of one material in a run, as a `formingx.forms.history.History`.
 
     `refresh` updates the coefficients of the stress in the forms.
-
-    Args:
-        forms: the `Formulation`.
-        terms: the `MaterialTerms` of the material.
     """
 
     rate_dependent = True
@@ -87,27 +83,16 @@ class PastStates:
         self.put(StoredStates(0.0, (undeformed,), np.ones((1, self._n)) if self._law.irreversible else None))
 
     def forget_motion(self) -> None:
-        """Discard the length of the last step, so that the stress integrand is linear in time over the next step.
-
-        With this length it would be a parabola through the last two states and the end of the next step.
-        """
+        """Discard the length of the last step, so that the integrand is linear in time over the next step."""
         self._last_step = 0.0
         self._refreshed = None
 
     def get(self) -> StoredStates:
-        """Return the past states up to the last accepted state.
-
-        Returns:
-            The history variables.
-        """
+        """Return the past states up to the last accepted state."""
         return self._stored
 
     def put(self, variables: StoredStates) -> None:
-        """Set the past states.
-
-        Args:
-            variables: result of `get`.
-        """
+        """Set the past states from the result of `get`."""
         self._stored, self._terms.start.value = variables, variables.time
         times = np.array([state.reduced_time for state in variables.states])
         self._past = np.array([state.C for state in variables.states])
@@ -135,10 +120,7 @@ class PastStates:
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """Add the present state of the forms to the past states, and drop states without effect on the stress.
 
-        Args:
-            x: not used.
-            control: load parameter (control) of the state, dimensionless; it gives the time.
-            start: not used.
+        The control gives the time; x and `start` are not used.
         """
         (C, step, _), variables = self._present(), self._stored
         states = [*variables.states, PastState(variables.states[-1].reduced_time + step, C)]
@@ -157,18 +139,10 @@ class PastStates:
 
     def transfer(self, source: PastStates, variables: StoredStates, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
-        """Interpolate the past states of a run on another mesh to this mesh; collective.
+        """Return the past states of a run on another mesh, interpolated to this mesh; collective.
 
-        Args:
-            source: past states on the other mesh.
-            variables: history variables of `source`, from `get`.
-            x: not used.
-            control: not used.
-            mapping: function from reference points of the other mesh, shape (n, coordinates), to reference points of
-                this mesh.
-
-        Returns:
-            The history variables on this mesh.
+        `mapping` takes reference points of the other mesh, shape (n, coordinates), to this mesh. x and control are not
+        used.
         """
         interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
         F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
@@ -191,11 +165,8 @@ class PastStates:
     def _indices_to_keep(self, states: list[PastState], C: np.ndarray, smallest_h: np.ndarray | None) -> list[int]:
         """Return the indices of the past states that cannot be interpolated from their neighbours; collective.
 
-        Args:
-            states: K past states, the last of them the present one.
-            C: entries 11, 22, 12, 33 of the present Cbar = J^(-2/3) C at n points, shape (4, n).
-            smallest_h: smallest damping h that has applied to each state so far, an upper bound of the present h, shape
-                (K, n). None: no bound.
+        The last of the K states is the present one. Cbar has shape (4, n), the bound `smallest_h` of damping (K, n) or
+        None.
         """
         if len(states) < 5:
             return list(range(len(states)))
@@ -222,11 +193,9 @@ class PastStates:
         return [*chosen, len(states) - 1]
 
     def _present(self) -> tuple[np.ndarray, Any, Any]:
-        """Return the present Cbar = J^(-2/3) C, and the reduced time since the last accepted state.
+        """Return the present Cbar = J^(-2/3) C, shape (4, n), reduced time since the last state, and its rate.
 
-        Returns:
-            Entries 11, 22, 12, 33 of Cbar, shape (4, n). Reduced time since the last accepted state. Reduced time per
-            process time. Both are numbers, or have the shape (n,) if the reduced time depends on the temperature.
+        The entries are 11, 22, 12, 33. Times are numbers, or have the shape (n,) if they depend on the temperature.
         """
         step: Any = self._forms.time_now - self._stored.time
         rate: Any = 1.0
@@ -243,11 +212,7 @@ class PastStates:
         return self._terms.material
 
     def smallest_stretch(self) -> tuple[float, np.ndarray]:
-        """Return the smallest principal isochoric stretch at the quadrature points in the present state; collective.
-
-        Returns:
-            The stretch; reference position of its point, shape (coordinates,), length.
-        """
+        """Return the smallest principal isochoric stretch and its reference position, (coordinates,); collective."""
         C = self._present()[0]
         half, apart = (C[0] + C[1]) / 2, np.hypot((C[0] - C[1]) / 2, C[2])
         squares = np.minimum(half - apart, C[3])
@@ -257,14 +222,7 @@ class PastStates:
         return float(np.sqrt(square)), np.array(point)
 
     def save(self, variables: StoredStates) -> dict[str, Any]:
-        """Return the past states as plain data, the same on all ranks; collective.
-
-        Args:
-            variables: past states with their times, as `get` returns them.
-
-        Returns:
-            Dictionary of numbers and arrays that `load` accepts.
-        """
+        """Return past states as plain data for `load`, the same on all ranks; collective."""
         numbers = gathered(self._forms.comm, self._numbers)
         order = np.argsort(numbers)
 
@@ -279,16 +237,9 @@ class PastStates:
                 **({} if variables.smallest_h is None else {"smallest_h": of_all(variables.smallest_h)})}
 
     def load(self, data: dict[str, Any]) -> StoredStates:
-        """Return the past states of this rank from stored data.
+        """Return the past states of this rank for `put`, from the result of `save`.
 
-        Args:
-            data: result of `save`.
-
-        Returns:
-            History variables for `put`.
-
-        Raises:
-            InputError: the data belong to another mesh or another material.
+        Data of another mesh or another material are an InputError.
         """
         numbers = np.array(data.get("cells", []), dtype=np.int64)
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)

@@ -9,11 +9,7 @@ _LDPE = [(129000, 1e-4), (94800, 1e-3), (58600, 0.01), (26700, 0.1), (9800, 1), 
 
 @register_published
 def melts() -> dict[str, Published]:
-    """Return melts with published K-BKZ constants, in Pa and s.
-
-    Returns:
-        {name: `Published`}.
-    """
+    """Return {name: `Published`} of melts with published K-BKZ constants, in Pa and s."""
     return {"LDPE melt 150 C": Published(
         KBKZ(_LDPE, PSM(alpha=14.38, beta=0.018)), "Pa", "low-density polyethylene, melt I", 150.0,
         "relaxation times from 1e-4 to 1000 s",

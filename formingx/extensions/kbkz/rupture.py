@@ -13,14 +13,7 @@ from .past_states import PastStates
 
 @register("scene")
 def ruptures(body: Any) -> Iterator[Finding]:
-    """Find processes that stretch a sheet beyond the equibiaxial `rupture_stretch` of its material.
-
-    Args:
-        body: the examined `formingx.checks.sizes.SizedBody`.
-
-    Yields:
-        A warning for each layer and each load, target or tool that causes such a stretch.
-    """
+    """Yield a warning for each layer and load, target or tool that stretches a sheet beyond `rupture_stretch`."""
     for name, material in body.scene.materials.items():
         limit = material.base.rupture_stretch("equibiaxial")
         for about, stretch in expected_stretches(body) if np.isfinite(limit) else ():
@@ -35,13 +28,9 @@ def ruptures(body: Any) -> Iterator[Finding]:
 
 @register("failure")
 def thins(failure: Any) -> Iterator[Finding]:
-    """Find a damped melt that thins without end in the last state of a failed run; collective.
+    """Yield the thinnest point of a damped melt that thins without end in a failed run's last state; collective.
 
-    Args:
-        failure: the failed run, with its `problem` and its `last` state.
-
-    Yields:
-        A finding with the thinnest point, if its equibiaxial stretch exceeds `rupture_stretch`.
+    Its equibiaxial stretch exceeds `rupture_stretch`.
     """
     if failure.last is None:
         return
