@@ -74,15 +74,9 @@ def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | Non
 
 
 def _adapted_sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
-    """Return a new mesh of a flat sheet with triangles of given sizes.
+    """Return a new mesh of a flat sheet with triangles of given sizes, shape (n,), at points (n, 2), length.
 
-    Args:
-        mesh: mesh of the sheet.
-        points: positions (x, y) at which sizes are given, shape (n, 2), length; sizes are linear between these.
-        sizes: edge lengths of triangles there, shape (n,), length.
-
-    Raises:
-        InputError: the mesh is no `sheet`, or its nodes were moved.
+    Sizes are linear between points. A mesh that is no `sheet`, or whose nodes were moved, is an InputError.
     """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import cKDTree
@@ -100,14 +94,7 @@ def _adapted_sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
 def checked_columns(mesh: Mesh) -> Columns:
     """Return the columns of elements along the sheet of a mesh.
 
-    Args:
-        mesh: the mesh.
-
-    Returns:
-        The columns.
-
-    Raises:
-        InputError: the mesh has no columns, or its nodes were moved.
+    A mesh without columns, or whose nodes were moved, is an InputError.
     """
     columns = mesh.columns
     if columns is None:
@@ -121,16 +108,10 @@ def checked_columns(mesh: Mesh) -> Columns:
 
 
 def _new_ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
-    """Return the coordinates of the ends of the k new columns along the sheet, such as radii of a disc, shape (k + 1,).
+    """Return coordinates of the ends of k new columns along the sheet, such as radii of a disc, shape (k + 1,).
 
-    A column consists of the elements through the sheet between two successive cross-sections.
-
-    Args:
-        columns: the n present columns; their `ends` are coordinates of the same kind.
-        factors: factors by which the columns should become longer, shape (n,); inf: as long as the longest column.
-
-    Raises:
-        InputError: too many columns would be needed.
+    The n columns become longer by `factors`, shape (n,); inf is the longest column. Too many new columns are an
+    InputError.
     """
     old = columns.ends
     fractions = np.arange(_COLUMN_SAMPLES) / _COLUMN_SAMPLES

@@ -58,12 +58,7 @@ def column_factors(path: Any, max_rotation: float | None, error: float | None) -
 
 
 def _nearest_column(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
-    """Return the number of the column nearest to each point, shape (m,).
-
-    Args:
-        points: reference positions, shape (m, 2), length.
-        middles: reference positions of nodes halfway along the n columns, shape (rows of nodes, n, 2), length.
-    """
+    """Return the nearest of n columns with middles (rows, n, 2) to each point (m, 2), shape (m,)."""
     n = middles.shape[1]
     from scipy.spatial import cKDTree
     return cKDTree(middles.reshape(-1, middles.shape[-1])).query(points)[1] % n
@@ -72,13 +67,8 @@ def _nearest_column(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
 def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) -> np.ndarray:
     """Return the required over the present length of the n columns of elements for a limit of rotation, shape (n,).
 
-    The limit applies to the angle by which the sheet turns from one end of a column to the other. On a fillet of a tool
-    it also applies to the length of the column over the fillet radius. The smallest ratio over the states is returned.
-
-    Args:
-        path: the run.
-        max_rotation: limit, radians.
-        middles: reference positions of nodes halfway along the columns, shape (rows of nodes, n, 2), length.
+    The limit, in radians, holds for the angle along a column, and on a fillet also for its length over the radius.
+    Middles of the columns have shape (rows of nodes, n, 2), length.
     """
     found = np.full(middles.shape[1], np.inf)
     problem = path.problem
@@ -114,15 +104,10 @@ def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) ->
 
 
 def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """Return the angle by which the sheet turns along each of n columns of elements, radians, at most 1, shape (n,).
+    """Return the angle by which the sheet turns along each of n columns, radians, at most 1, shape (n,).
 
-    Where the tangent jumps between two columns, each of the two angles includes half of the jump.
-
-    Args:
-        edges: deformed edges of the outline: first end, second end, midpoint, shape (m, 3, 2), length.
-        sides: (numbers, mask) for each of the two faces, in the order of the columns, shape (n,) each. The numbers are
-            the rows of the face's edges in `edges`. The mask is True for an edge whose first end lies at the end of its
-            column.
+    Edges have shape (m, 3, 2). A jump between two columns counts half in each. Each of the two `sides` has rows of
+    edges and masks of those that end at the column's end, (n,).
     """
     tangent = np.zeros(edges.shape[-1])                      # at both ends of each column, averaged over both faces
     for numbers, reversed_edges in sides:
@@ -145,10 +130,7 @@ def _factors_by_stress_error(path: Any, error: float, middles: np.ndarray) -> np
     the constant C of each column. s is the length along the sheet. The smallest ratio of h to the present length over
     the examined states is returned.
 
-    Args:
-        path: the run.
-        error: largest estimated error of the stress over the stress, epsilon, both as norms over the body.
-        middles: reference positions of nodes halfway along the columns, shape (rows of nodes, n, 2), length.
+    `error` is epsilon; middles of the columns have shape (rows of nodes, n, 2), length.
     """
     n = middles.shape[1]
     length = np.linalg.norm(np.diff(path.problem.scene.mesh.columns.place(

@@ -15,18 +15,10 @@ _MIN_SIZE_RATIO = 0.25
 
 
 def required_sizes(path: Any, max_rotation: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
-    """Return the triangle sizes that the states of a run on a sheet in three dimensions demand.
+    """Return positions of the nodes of the flat sheet, shape (n, 2), and the required sizes, shape (n,), length.
 
-    Each limit reduces the size; the smallest size of all states counts.
-
-    Args:
-        path: the run.
-        max_rotation: largest rotation of the surface between neighbouring triangles, radians; None: ignored.
-        error: largest relative change of the wall between neighbouring triangles; None: ignored.
-
-    Returns:
-        Positions (x, y) of the nodes of the flat sheet, shape (n, 2), length; edge lengths of triangles there, shape
-        (n,), length.
+    Each limit reduces the size in each state, None does not: rotation (radians) and relative wall change between
+    neighbouring triangles.
     """
     factor: np.ndarray = np.ones(0)
     for state in path.states:
@@ -63,15 +55,9 @@ def _neighbours(triangles: np.ndarray) -> np.ndarray:
 
 
 def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return sizes at nodes, reduced so that at the ends of an edge they differ by at most 0.25 of its length.
+    """Return sizes, shape (n,), reduced in place so that they differ by at most 0.25 of the length of an edge.
 
-    Args:
-        points: positions of the nodes, shape (n, 3), length.
-        triangles: node numbers, shape (m, 3).
-        size: required edge lengths of triangles at the nodes, shape (n,), length; changed in place.
-
-    Returns:
-        The reduced `size`.
+    Nodes have positions (n, 3), triangles the node numbers (m, 3).
     """
     a, b = edges_of(triangles)[1].T
     growth = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
