@@ -245,13 +245,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
 def _compare_maps(left: csv_files.CsvTable, right: csv_files.CsvTable, names: list[str]) -> Comparison:
     """Return the comparison of two maps of walls at the positions (X, Y) of theirs.
 
-    Args:
-        left: our table, with the columns X and Y.
-        right: their table.
-        names: columns to compare.
-
-    Raises:
-        InputError: no point of theirs lies within ours.
+    Points of theirs that all lie outside ours are an InputError.
     """
     from scipy.interpolate import LinearNDInterpolator
     ours, theirs = (np.column_stack([side.take(c, side.units[c]) for c in (*_MAP, *names)]) for side in (left, right))
@@ -273,11 +267,9 @@ def _compare_maps(left: csv_files.CsvTable, right: csv_files.CsvTable, names: li
 
 
 def _map_resolution(points: np.ndarray, scale: np.ndarray) -> float:
-    """Return the largest change of a map at every other point if these are left out, over its range.
+    """Return the largest change of a map at half of its n points if these are left out, over its range.
 
-    Args:
-        points: X, Y and the compared columns at n points, shape (n, c).
-        scale: range of each column, shape (c,).
+    Points have X, Y and compared columns, shape (n, c), with ranges (c,).
     """
     from scipy.interpolate import LinearNDInterpolator
     if len(points) < 8:
@@ -293,12 +285,7 @@ def _percent(share: float) -> str:
 
 
 def _table(side: str, given: Any) -> csv_files.CsvTable:
-    """Return one side of a comparison as a table.
-
-    Args:
-        side: name of the side, for messages.
-        given: a `Path`, a CSV file, or {column: values}.
-    """
+    """Return a `Path`, a CSV file, or {column: values} as a table; `side` is named in messages."""
     if hasattr(given, "states"):
         if len(given) < 2:
             raise InputError(f"{side}: the path has {len(given)} states; it needs at least 2")
@@ -310,11 +297,8 @@ def _table(side: str, given: Any) -> csv_files.CsvTable:
 def _columns(left: csv_files.CsvTable, right: csv_files.CsvTable, given: Any) -> dict[str, str]:
     """Return the columns to compare, {our name: their name}, checked.
 
-    Args:
-        left: our table.
-        right: their table.
-        given: argument `columns` of `compare`; None for the first two columns of equal name, of tables of the
-            wall the first one and "wall".
+    `given` is the argument of `compare`; None for the first two columns of equal name, and for walls the first one and
+    "wall".
     """
     if given is None:
         shared = [c for c in left.columns if c in right.columns and c != "iterations"]
@@ -338,14 +322,8 @@ def _columns(left: csv_files.CsvTable, right: csv_files.CsvTable, given: Any) ->
 def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | None) -> int | None:
     """Return the number of the column at whose values the others are compared, or None to pair by arc length.
 
-    Args:
-        names: names of the c columns.
-        a: points of our curve, shape (n, c).
-        b: points of their curve, shape (l, c).
-        along: argument `along` of `compare`.
-
-    Raises:
-        InputError: `along` is no column, or is not monotonic on both sides.
+    Our points have shape (n, c), theirs (l, c). An `along` that is no column, or not monotonic on both sides, is an
+    InputError.
     """
     monotonic = [k for k in range(len(names)) if _is_monotonic(a[:, k]) and _is_monotonic(b[:, k])]
     if along is None:
@@ -366,10 +344,7 @@ def _is_monotonic(values: np.ndarray) -> bool:
 
 
 def _largest_slope(points: np.ndarray, k: int) -> float:
-    """Return the largest slope |d column| / |d column k| between successive points of a curve, over all columns.
-
-    points: points of the curve, shape (n, c). k: number of the independent column.
-    """
+    """Return the largest slope |d column| / |d column k| of successive points (n, c) over all columns."""
     steps = np.abs(np.diff(points, axis=0))
     return float((steps.max(1) / steps[:, k]).max())
 
@@ -377,11 +352,8 @@ def _largest_slope(points: np.ndarray, k: int) -> float:
 def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Difference:
     """Return the difference of one column between two curves, with its maximum and root mean square.
 
-    Args:
-        values: differences at the k compared points of their curve, shape (k,).
-        size: range of the column in our curve, its largest minus its smallest value.
-        partners: points of our curve with which the k points are compared, each of the c columns divided by its range,
-            shape (k, c). The root mean square is weighted with the arc length along these points.
+    Values have shape (k,). Partners, (k, c) in units of ranges, weight the mean by arc length; `size` is the range of
+    the column.
     """
     s = arc_length(partners)
     weights = np.ones(len(s))
@@ -396,14 +368,8 @@ def _limit_points(table: csv_files.CsvTable, points: np.ndarray, names: list[str
                   ) -> list[dict[str, float]]:
     """Return the limit points of a curve, each as {column: value}.
 
-    For a run they are its states of the kind "limit point". For other tables each is the vertex of the parabola through
-    three points, at whose middle point the control turns.
-
-    Args:
-        table: the table of the curve.
-        points: points of the curve, shape (n, c).
-        names: names of the c columns.
-        control: name of the column that is the control.
+    For a run they are its states of the kind "limit point", else vertices of parabolas through three points, (n, c),
+    where the control turns.
     """
     if table.kinds is not None and "start" in table.kinds:
         return [dict(zip(names, p.tolist())) for p, kind in zip(points, table.kinds) if kind == "limit point"]

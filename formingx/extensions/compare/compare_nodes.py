@@ -184,10 +184,7 @@ def compare_nodes(path: Any, theirs: Any, *, state: Any = None, mesh: str | os.P
 
 
 def _columns(path: Any) -> list[str]:
-    """Return the names of columns with reference positions and displacements in a run, such as R, Z, u_r, u_z.
-
-    path: the `Path` of the run.
-    """
+    """Return the names of columns with reference positions and displacements, such as R, Z, u_r, u_z."""
     return [*_coordinates(path), *(f"u_{axis}" for axis in path.problem.scene.kinematics.axes)]
 
 
@@ -199,13 +196,7 @@ def _coordinates(path: Any) -> tuple[str, ...]:
 
 
 def _displacements(path: Any, state: Any, points: np.ndarray) -> np.ndarray:
-    """Return the displacements in a state at reference positions, shape (n, 2) or (n, 3), length.
-
-    Args:
-        path: the computed `Path`.
-        state: a state of the path, or None for the last.
-        points: reference positions, shape (n, 2), length.
-    """
+    """Return the displacements in a state (None: the last) at reference points (n, 2), shape (n, 2) or (n, 3)."""
     problem, state = path.problem, state or path.last
     with problem.state_context(state):
         return probe(problem, points).displacement(problem.x)

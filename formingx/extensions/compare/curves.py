@@ -17,36 +17,20 @@ _MAX_POINTS = 10_000                     # largest number of points to pair: eac
 
 @np.errstate(over="ignore")
 def ranges(points: np.ndarray) -> np.ndarray:
-    """Return the range of each column of a curve, its largest minus its smallest value.
-
-    Args:
-        points: points of the curve, shape (n, c), in the units of the columns.
-
-    Returns:
-        Ranges, shape (c,).
-    """
+    """Return the range of each column, largest minus smallest value, shape (c,), of points (n, c)."""
     return np.ptp(points, axis=0)
 
 
 def arc_length(points: np.ndarray) -> np.ndarray:
-    """Return the arc lengths of points along the polyline through them.
-
-    Args:
-        points: points in order, shape (n, c).
-
-    Returns:
-        Arc lengths from the first point, shape (n,).
-    """
+    """Return the arc lengths of points in order, (n, c), along their polyline, shape (n,)."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
 class SampledCurve:
     """Curve through points in the space of c columns, interpolated over the arc length.
 
-    Akima's interpolation causes no oscillation at a kink, such as a first contact.
-
-    Args:
-        points: points of the curve in order, shape (n, c), each column divided by its range.
+    Akima's interpolation causes no oscillation at a kink, such as a first contact. The points have shape (n, c), in
+    order, each column divided by its range.
 
     Attributes:
         evaluate: function that returns the points of the curve at arc lengths.
@@ -64,14 +48,9 @@ class SampledCurve:
         self.line = self.evaluate(self.arc_lengths)
 
     def closest_point(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
-        """Return the point of the curve that is closest to a given point, in the two pieces that meet at a sample.
+        """Return the closest point of the curve next to sample k, (c,), and True for a point beyond an end.
 
-        Args:
-            point: the point, shape (c,).
-            k: number of the sample; the result lies between the samples before and after it.
-
-        Returns:
-            The closest point of the curve, shape (c,); True if `point` lies beyond an end of the curve.
+        Only the two pieces of the curve that meet at the sample are examined.
         """
         low, high = max(k - 1, 0), min(k + 1, CURVE_POINTS - 1)
         line = self.evaluate(np.linspace(self.arc_lengths[low], self.arc_lengths[high], PIECE_POINTS))
@@ -90,18 +69,9 @@ class SampledCurve:
 
 
 def pair_in_order(points: np.ndarray, curve: SampledCurve) -> tuple[np.ndarray, np.ndarray]:
-    """Pair points with points of a curve in order, so that the sum of squared distances is minimal.
+    """Return k indices of points (n, c) and their partners on the curve, (k, c), of least squared distances in order.
 
-    Args:
-        points: the points in order, shape (n, c).
-        curve: the curve.
-
-    Returns:
-        Indices of the k points that do not lie beyond the ends of the curve, shape (k,); their partners on the curve,
-        shape (k, c).
-
-    Raises:
-        InputError: too many points, or points in the reverse order of the curve.
+    Points beyond the ends are left out. Too many points, or points in the reverse order, are an InputError.
     """
     n, line = len(points), curve.line
     if n > _MAX_POINTS:
@@ -120,31 +90,17 @@ def pair_in_order(points: np.ndarray, curve: SampledCurve) -> tuple[np.ndarray, 
 
 
 def pair_at_equal_values(points: np.ndarray, curve: np.ndarray, k: int) -> tuple[np.ndarray, np.ndarray]:
-    """Pair points with points of a curve at equal values of one column.
-
-    Args:
-        points: the points, shape (n, c).
-        curve: points of the curve, shape (l, c).
-        k: number of the column.
-
-    Returns:
-        Indices of the j points between the ends of the curve, shape (j,); their partners on the curve, shape (j, c).
-    """
+    """Return j indices of points (n, c) and their partners on a curve (l, c) at equal values of column k, (j, c)."""
     low, high = curve[:, k].min(), curve[:, k].max()
     inside = np.flatnonzero((points[:, k] >= low - 1e-9) & (points[:, k] <= high + 1e-9))
     return inside, _interpolant(curve, k)(np.clip(points[inside, k], low, high))
 
 
 def resolution_of(points: np.ndarray, k: int | None) -> float:
-    """Return the resolution of a curve: the largest error if every second point is interpolated from the others.
+    """Return the largest error of a curve if every second point is interpolated from the others, dimensionless.
 
-    Args:
-        points: points of the curve, shape (n, c), each column divided by its range.
-        k: number of the independent column: the error is the difference in another column at an equal value of this
-            one. None: the error is the distance from the interpolated curve.
-
-    Returns:
-        Resolution, dimensionless; infinite for fewer than five points.
+    Points have shape (n, c). The error is that of columns at equal column k, or with None the distance; infinite below
+    five points.
     """
     if len(points) < 5:
         return float("inf")
@@ -159,15 +115,7 @@ def resolution_of(points: np.ndarray, k: int | None) -> float:
 
 
 def _pairing_costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the smallest sums of squared distances between points and their partners, samples of a curve in order.
-
-    Args:
-        points: the points, shape (n, c).
-        line: the samples of the curve, shape (m, c).
-
-    Returns:
-        Sums, shape (n, m): entry (i, j) is the sum over points 0 to i, with sample j as the partner of point i.
-    """
+    """Return the least sums of squared distances of points (n, c) to ordered partners in samples (m, c), (n, m). """
     cost = np.stack([((line - p) ** 2).sum(1) for p in points])
     for i in range(1, len(points)):
         cost[i] += np.minimum.accumulate(cost[i - 1])

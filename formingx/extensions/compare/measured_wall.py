@@ -138,19 +138,10 @@ class MeasuredWall:
                               interpolated(profile.wall_thickness), distance, path.problem.comm)
 
     def _locate(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the positions of the measured points on the middle line of a computed part, which is a polyline.
+        """Return positions of measured points on the middle line, (m,), and distances from it, (m,), length.
 
-        Args:
-            profile: outline of the computed part, a `Profile`.
-
-        Returns:
-            Positions in units of the point number of the polyline (2.5: halfway between points 2 and 3), shape (m,).
-            Distances of points given by (r, z) from the line, shape (m,), length. For points given by arc lengths it is
-            the arc length by which they lie beyond an end of the line, 0 between the ends.
-
-        Raises:
-            InputError: a measured `length` or `reference_length` lies outside the computed part by more than a tenth of
-                its length.
+        Positions count the points of the polyline (2.5: between points 2 and 3). For arc lengths the distance is that
+        beyond an end; more than a tenth of the length is an InputError.
         """
         numbers = np.arange(len(profile.middle), dtype=float)
         if self.points is None:
