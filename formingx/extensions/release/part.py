@@ -10,21 +10,10 @@ _EDGES = ((0, 1), (1, 2), (2, 0))
 
 
 def trimmed_mesh(mesh: Mesh, line: np.ndarray, segments: int) -> Mesh:
-    """Return the elements of a mesh that lie along the first segments of a line through the body; collective.
+    """Return the elements of a mesh along the first segments of a polyline (n, 2) through the body; collective.
 
-    Each boundary that vanishes, such as the rim, is moved to the cut edges; without such a boundary they are named
-    "trim".
-
-    Args:
-        mesh: the mesh.
-        line: points of a polyline through the body, such as the middle line of a sheet, shape (n, 2), length.
-        segments: number of the n - 1 segments whose elements remain.
-
-    Returns:
-        The mesh of these elements.
-
-    Raises:
-        InputError: no element of a layer remains.
+    A boundary that vanishes, such as the rim, moves to the cut edges, else named "trim". A layer without elements is an
+    InputError.
     """
     grid = gathered(mesh)
 
@@ -36,12 +25,7 @@ def trimmed_mesh(mesh: Mesh, line: np.ndarray, segments: int) -> Mesh:
 
 
 def _nearest(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return for each point the number of the nearest segment of a polyline, counted from 0, shape (m,).
-
-    Args:
-        points: positions of m points, shape (m, 2), length.
-        line: corners of the polyline in order, shape (n, 2), length.
-    """
+    """Return the number of the nearest segment of a polyline (n, 2) to each point (m, 2), shape (m,)."""
     a, along = line[:-1], np.diff(line, axis=0)
     offsets = points[:, None] - a
     share = np.clip(np.einsum("mij,ij->mi", offsets, along) / np.einsum("ij,ij->i", along, along), 0, 1)
@@ -49,12 +33,7 @@ def _nearest(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 def _part_of_grid(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
-    """Return the grid of some of the triangles of a grid, with boundaries on the cut edges.
-
-    Args:
-        grid: the whole grid.
-        layers: {layer: rows of node numbers of the triangles that remain}.
-    """
+    """Return the grid of some triangles, {layer: rows of node numbers}, with boundaries on the cut edges."""
     triangles = np.concatenate(list(layers.values()))
     outline, before = _boundary_edges(triangles), _boundary_edges(np.concatenate(list(grid.layers.values())))
     cut: np.ndarray = np.array([edge for key, edge in outline.items() if key not in before], dtype=np.int64)

@@ -97,10 +97,7 @@ class Springback(KeyNumbers):
 
 
 def _height(wall: Wall) -> float:
-    """Return the height of a part: the largest axial distance of its middle line from its pole, the point at r = 0.
-
-    The middle line of a part without a pole, such as a ring, is measured from its lowest point.
-    """
+    """Return the largest axial distance of the middle line from the pole, or from its lowest point without one."""
     return float(wall.height.max())
 
 
@@ -166,15 +163,9 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
 
 def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, trimmed: float,
          units: Units) -> Springback:
-    """Release a part, then let it cool or relax, and return its shape before and after.
+    """Release a part, then let it cool or relax for `cooling_time`, and return its shape before and after.
 
-    Args:
-        problem: the problem of the free part.
-        x: unknowns of the part in its tools, locally owned entries.
-        cooling_time: duration after the release; 0: none.
-        accuracy: relative error of a step in time.
-        trimmed: radius r of the end of the part in its tools, at the trim line if it is trimmed, length.
-        units: units of the labels.
+    x are the owned unknowns of the part in its tools; `trimmed` is the radius r of its end there, length.
     """
     stages = [Stage("release"), *([Stage("cool", duration=cooling_time)] if cooling_time else [])]
     record = Record(problem, Curve(problem, Tolerances()))
@@ -193,16 +184,8 @@ def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, 
 def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any, wall: Wall) -> tuple[Any, float]:
     """Return the `Cooling` of the released part (or None without heat), and the duration of its cooling or relaxation.
 
-    Args:
-        scene: the scene of the part in its tools.
-        mesh: mesh of the part.
-        temperature: temperature of both faces after the release, or None.
-        boundaries: list of laws of the faces or {boundary: temperature}, or None.
-        duration: time of cooling or relaxation after the release, or None for the default.
-        wall: `Wall` of the part in its tools.
-
-    Raises:
-        InputError: arguments that do not fit the scene.
+    Faces get a temperature after the release or laws {boundary: temperature}; None is the default. Arguments that do
+    not fit the scene are an InputError.
     """
     if scene.heat is None:
         if temperature is not None or boundaries is not None:
@@ -226,10 +209,7 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
     """Return the scene of the part alone, constrained on its symmetry planes and against rigid motion.
 
-    Args:
-        scene: the scene of the part in its tools.
-        mesh: mesh of the part.
-        heat: `Cooling` of the part after the release, or None.
+    `heat` is the `Cooling` after the release, or None.
     """
     symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
     supports: list[Support] = [*symmetries]
@@ -249,9 +229,7 @@ def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
 class _FixedComponent(PinnedNode):
     """Constraint of one displacement component of a node against rigid motion; a free body exerts no force on it.
 
-    Args:
-        component: 0 for the radial displacement, 1 for the axial one.
-        point: reference position of the node, shape (2,), length.
+    The component is 0 for radial and 1 for axial; the node has a reference position, shape (2,), length.
     """
 
     def __init__(self, component: int, point: np.ndarray):
@@ -263,13 +241,7 @@ class _FixedComponent(PinnedNode):
 
 
 def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
-    """Return the mesh of a part up to the line of nodes nearest to a trim, and the deformed radius of this line.
-
-    Args:
-        mesh: the mesh of the whole body.
-        wall: wall of the body in its tools.
-        trim: radius r, or ("height", h), at which the part ends, length; None: the whole body.
-    """
+    """Return the mesh up to the nodes nearest to a trim, radius r or ("height", h), and their deformed radius."""
     strips = float(strips_within(wall, trim).sum())                               # an edge has two strips
     last = int(np.clip(round(strips / 2), 1, (len(wall.r) - 1) // 2))
     middle = (wall.profile.reference_bottom + wall.profile.reference_top)[::2] / 2
@@ -277,16 +249,7 @@ def _trimmed(mesh: Mesh, wall: Wall, trim: Any) -> tuple[Mesh, float]:
 
 
 def _transferred_unknowns(source: Any, state: Any, problem: Problem) -> np.ndarray:
-    """Return the unknowns of the part in a state of the whole body, and transfer the history variables to the part.
-
-    Args:
-        source: the problem of the whole body.
-        state: the state of the whole body.
-        problem: the problem of the part; its fields are set to these unknowns.
-
-    Returns:
-        Unknowns of `problem`, locally owned entries.
-    """
+    """Return the owned unknowns of a part in a state of the whole body, and set its fields and history variables."""
     restrict_fields(source, state, problem)
     x = np.zeros(problem.x.getLocalSize())
     x[: problem.n_owned] = problem.forms.w.x.array[: problem.n_owned]
