@@ -10,10 +10,7 @@ from .variables import sets_of_values
 
 
 def _first_case(build: Callable[..., Any], variables: Any, *_: Any, **__: Any) -> None:
-    """Build and run only the first set of values of a study, for a check of a script.
-
-    build, variables: first two arguments of `study`. Its other arguments are ignored.
-    """
+    """Build and run only the first set of values, for a check of a script, as `study` is called."""
     build(**sets_of_values(variables)[0])
 
 

@@ -15,17 +15,7 @@ _GAP = 3.0
 
 def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measure: str,
                  labels: dict[str, str]) -> Any:
-    """Draw the main effects on a measure: one panel per variable, runs as dots, the mean at each level as a line.
-
-    Args:
-        runs: the successful runs (`StudyRun`).
-        effects: result of `Study.effects` for this measure.
-        measure: name of the measure.
-        labels: {name of a variable or measure: its label with unit}.
-
-    Returns:
-        The matplotlib figure.
-    """
+    """Return a figure of the main effects on a measure: one panel per variable, runs as dots, the means as a line."""
     drawing, axes = figure(len(effects), width=3.8, height=3.4)
     for ax, (variable, levels) in zip([axes] if len(effects) == 1 else axes, effects.items()):
         ax.plot([run.values[variable] for run in runs], [run.measures[measure] for run in runs], ".", color="0.75")
@@ -36,18 +26,7 @@ def main_effects(runs: list[Any], effects: dict[str, dict[float, float]], measur
 
 
 def pareto(runs: list[Any], front: list[Any], a: str, b: str, labels: dict[str, str]) -> Any:
-    """Draw two measures of all runs as dots, with the Pareto front as a line.
-
-    Args:
-        runs: the successful runs (`StudyRun`).
-        front: runs of the Pareto front, in order.
-        a: name of the first measure.
-        b: name of the second measure.
-        labels: {name of a variable or measure: its label with unit}.
-
-    Returns:
-        The matplotlib figure.
-    """
+    """Return a figure of two measures, a and b, of all runs as dots, with the ordered Pareto front as a line."""
     drawing, axes = figure()
     axes.plot([run.measures[a] for run in runs], [run.measures[b] for run in runs], ".", color="0.75")
     points = np.array([(run.measures[a], run.measures[b]) for run in front])
@@ -60,16 +39,7 @@ def pareto(runs: list[Any], front: list[Any], a: str, b: str, labels: dict[str, 
 
 
 def page(study: Any, title: str, labels: dict[str, str]) -> str:
-    """Return the HTML page of `Study.report`: best run, main effects, Pareto fronts, all runs.
-
-    Args:
-        study: the `Study`.
-        title: heading of the page.
-        labels: {name of a variable or measure: its label with unit}.
-
-    Returns:
-        HTML text.
-    """
+    """Return the HTML page of `Study.report`: best run, main effects, Pareto fronts, all runs."""
     names = {name: label.rpartition(", ")[0] or label for name, label in labels.items()}
     body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{pages.lines(study.text(names))}</p>"]
     if study.goal and study.successful:

@@ -44,17 +44,9 @@ class Sensitivities(NamedTuple):
 
 
 def sobol(runs: Sequence[Any], variables: Sequence[str], measure: str) -> Sensitivities:
-    """Return the Sobol indices of a response that is fitted to runs.
+    """Return the Sobol indices of a response that is fitted to runs, of second order, or of first with few runs.
 
-    The response is a polynomial of second order with products of two variables, or of first order with few runs.
-
-    Args:
-        runs: the successful runs (`StudyRun`).
-        variables: names of the variables.
-        measure: name of the measure.
-
-    Raises:
-        InputError: no variable varies, there are too few runs, or the measure is the same in all runs.
+    No varying variable, too few runs, or a measure equal in all runs is an InputError.
     """
     from scipy import stats
     names = [name for name in variables if np.ptp([run.values[name] for run in runs] or [0.0]) > 0]

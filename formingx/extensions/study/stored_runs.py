@@ -16,18 +16,9 @@ from .task import StudyRun, Task
 
 
 def prepare_folder(folder: FilePath, task: Task, variables: list[str]) -> FilePath:
-    """Make the folder of a study, or check that an existing folder belongs to it.
+    """Make the folder of a study, or check that an existing folder belongs to it, and return its path.
 
-    Args:
-        folder: path of the folder.
-        task: task of the study; the names of its functions must be those stored in the folder.
-        variables: names of the variables.
-
-    Returns:
-        The path of the folder.
-
-    Raises:
-        InputError: a folder of another study.
+    The names of variables and of the task's functions must be those stored; another study is an InputError.
     """
     about = {"study": 1, "build": getattr(task.build, "__qualname__", ""), "variables": variables,
              "measures": list(task.measures)}
@@ -44,19 +35,10 @@ def prepare_folder(folder: FilePath, task: Task, variables: list[str]) -> FilePa
 
 
 def read(folder: FilePath, variables: list[str]) -> list[StudyRun]:
-    """Return the runs stored in the folder of a study, one for each set of values.
+    """Return the runs stored in the folder of a study, one for each set of values, in the order of storing.
 
-    A run that failed by a fault of the script is repeated by the study; its second run replaces it.
-
-    Args:
-        folder: path of the folder.
-        variables: names of the variables of the study.
-
-    Returns:
-        The runs, in the order in which they were stored.
-
-    Raises:
-        InputError: a file that cannot be read.
+    A run that failed by a fault of the script is repeated by the study; its second run replaces it. An unreadable file
+    is an InputError.
     """
     found: list[StudyRun] = []                                  # of runs with equal values the first final one counts
     for file in sorted(_files(folder)):
@@ -75,12 +57,7 @@ def read(folder: FilePath, variables: list[str]) -> list[StudyRun]:
 
 
 def write(folder: FilePath, run: StudyRun) -> None:
-    """Write a run to a new file in the folder of a study.
-
-    Args:
-        folder: path of the folder.
-        run: the run.
-    """
+    """Write a run to a new file in the folder of a study."""
     # the number is one above the largest; the checksum distinguishes files of two processes with one number
     last = max((int(file.name[4:9]) for file in _files(folder)), default=-1)
     values = zlib.crc32(json.dumps(run.values, sort_keys=True).encode())

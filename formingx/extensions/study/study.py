@@ -82,8 +82,7 @@ class Study(ColumnTable):
     def _measures_of_goal(self, a: str | None, b: str | None) -> tuple[str, str]:
         """Return the names of two measures; by default the first two of the goal.
 
-        Raises:
-            InputError: one measure alone is given, or none and the goal has fewer than two.
+        One measure alone, or none with fewer than two in the goal, is an InputError.
         """
         if a is not None and b is not None:
             return a, b
@@ -374,10 +373,9 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
 
 
 def _measures(build: Any, measures: Any) -> dict[str, Measure]:
-    """Check the arguments `build` and `measures` of a study, and return `measures` as a new dict.
+    """Return `measures` as a new dict of functions and column names, after a check of it and of `build`.
 
-    Raises:
-        InputError: `build` is no function, or `measures` is no dict of functions and names of columns.
+    An InputError names what is no function or no column.
     """
     if not callable(build):
         raise InputError(f"study: build = {build!r}: must be a function of the variables that gives back a path")

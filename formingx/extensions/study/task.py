@@ -79,8 +79,7 @@ class Task(NamedTuple):
 class _RunLogFilter(logging.Filter):
     """Log filter that adds the variables of a run to its log records and collects its warnings; for one thread.
 
-    Args:
-        values: {variable of the study: its value in this run}.
+    `values` is {variable of the study: its value in this run}.
     """
 
     def __init__(self, values: dict[str, float]):
@@ -98,27 +97,14 @@ class _RunLogFilter(logging.Filter):
 
 
 def as_text(numbers: Mapping[str, float]) -> str:
-    """Return numbers and their names as text, such as "depth = 30, radius = 18".
-
-    Args:
-        numbers: {name: value}.
-
-    Returns:
-        The text.
-    """
+    """Return numbers and their names as text, such as "depth = 30, radius = 18"."""
     return ", ".join(f"{name} = {value:.4g}" for name, value in numbers.items())
 
 
 def completed_runs(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRun]:
-    """Run a task with sets of values, the first one alone, and yield the runs as they finish.
+    """Run a task with sets of values, the first one alone, and yield all runs as they finish, also failed ones.
 
-    Args:
-        pool: an executor of `concurrent.futures`.
-        task: the task.
-        cases: {variable: value} of each run.
-
-    Yields:
-        The runs, also those that failed.
+    The pool is an executor of `concurrent.futures`.
     """
     for batch in (cases[:1], cases[1:]):
         jobs: dict[Any, dict] = {pool.submit(task, case): case for case in batch}
@@ -128,15 +114,7 @@ def completed_runs(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRu
 
 
 def executor_context(executor: futures.Executor | None, workers: int) -> Any:
-    """Return a context manager of an executor for the runs of a study.
-
-    Args:
-        executor: the user's executor, which stays open; None: new processes, which end with the block.
-        workers: number of new processes.
-
-    Returns:
-        The context manager; it yields the executor.
-    """
+    """Return a context of an executor for the runs of a study: the user's, which stays open, or new processes."""
     if executor:
         return nullcontext(executor)
     from multiprocessing import get_context  # a slow import that only this call needs
@@ -144,14 +122,7 @@ def executor_context(executor: futures.Executor | None, workers: int) -> Any:
 
 
 def check_importable(task: Task) -> None:
-    """Raise an InputError unless the functions of a task can be sent to another process.
-
-    Args:
-        task: the task.
-
-    Raises:
-        InputError: a function that cannot be imported by name.
-    """
+    """Raise an InputError if a function of a task cannot be imported by name in another process."""
     try:
         pickle.dumps(task)
     except Exception as error:

@@ -8,16 +8,10 @@ from ...errors import InputError, as_list, finite
 
 
 def sets_of_values(variables: Any) -> list[dict[str, float]]:
-    """Return the sets of values of a parameter study, one for each run.
+    """Return the sets of values of a study, {name: value} for each run.
 
-    Args:
-        variables: {name: values} for all combinations, or a list of {name: value}, one for each run.
-
-    Returns:
-        List of {name: value}.
-
-    Raises:
-        InputError: variables or values that are not allowed.
+    Values {name: values} are combined; a list of sets is checked. Variables or values that are not allowed are an
+    InputError.
     """
     if isinstance(variables, Mapping):
         levels = {str(name): [finite(f"study: {name}", v) for v in as_list(f"study: {name}", values, "numbers")]
