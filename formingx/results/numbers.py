@@ -68,11 +68,9 @@ class PartNumbers(KeyNumbers):
         return "weight" + ", lengths taken for cm" * (not self.units.length)
 
     def _rows(self, where: str, further: list[tuple[str, str]]) -> list[tuple[str, str]]:
-        """Return the rows of the printed table, as pairs (name, value with its unit).
+        """Return the rows (name, value with unit) of the printed table, `further` ones before that of the scrap.
 
-        Args:
-            where: place of the minimum wall, as text.
-            further: rows that only this kind of part has; they precede the row of the scrap.
+        `where` is the place of the minimum wall.
         """
         rows = [("given for", self.basis)] if self.basis else []
         if self.weight is not None:

@@ -80,11 +80,7 @@ class Reader(Protocol):
 
 
 class SectionReader:
-    """Reader of an axisymmetric or plane-strain section.
-
-    Args:
-        path: the path whose states are evaluated.
-    """
+    """Reader of an axisymmetric or plane-strain section."""
 
     def __init__(self, path: Any):
         self._path, self._walls = path, Walls(path)
@@ -95,24 +91,12 @@ class SectionReader:
         return self._walls.evaluate(state)
 
     def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> KeyNumbers:
-        """Return the key numbers of the part in a state.
-
-        Args:
-            state: the state.
-            density: density of the material, g/cm3; None: no weight.
-            trim: radius at which the part is cut off, or ("height", h), length; None: not cut.
-            heights: axial distances from the pole at which the wall is listed, length.
-            units: units of the script.
-        """
+        """Return the key numbers of the part in a state; see `Path.part`."""
         from .evaluate.part import part
         return part(self.wall(state), self._axisymmetric, density, trim, heights, units, self._path.scene.symmetry)
 
     def filling(self, contact: FaceContact) -> Filling:
-        """Return the remaining gaps in the corners of the tool of a contact (`Path.filling`).
-
-        Raises:
-            InputError: the run has several meshes, or the tool has no corner that the body must fill.
-        """
+        """Return the gaps in the corners of a tool (`Path.filling`); InputError for several meshes or no corner."""
         if len(self._path.segments) > 1:
             raise InputError("filling: is not available for a remeshed run as a whole: evaluate the states of one"
                              " mesh, path.same_mesh(state).filling()")
@@ -126,12 +110,7 @@ class SectionReader:
         draw(self._whole(state), file, self._path.problem.comm)
 
     def solid(self, state: State) -> tuple:
-        """Return the closed surface of the whole part in a state, the revolved or extruded section.
-
-        Returns:
-            Points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3); wall
-            over original thickness at the points, shape (n,).
-        """
+        """Return points (n, 3), triangles (m, 3) and wall ratios (n,) of the whole part in a state."""
         from .files.solid import coloured
         return coloured(self._whole(state), self._axisymmetric)
 
@@ -140,19 +119,7 @@ class SectionReader:
         return whole_part(self._path.profile(state), self._path.scene.symmetry)
 
     def report(self, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-        """Write the report of the run as an HTML file.
-
-        Args:
-            file: its name ends in .html.
-            title: heading of the page.
-            failure: the `ConvergenceError` that ended the run, or None.
-            units: units of the script, for the labels.
-            density: density of the material, g/cm3; None: no weight.
-            trim: radius at which the part is cut off, or ("height", h), length; None: not cut.
-
-        Returns:
-            The path of the file.
-        """
+        """Write the report of the run as an HTML file, and return its path; see `Path.report`."""
         from .show import report
         return report.write(report.of_path(self._path), file, title, failure, self._path.problem.comm, units, density,
                             trim)

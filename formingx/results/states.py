@@ -32,11 +32,6 @@ _ROUNDING_ERROR = 0.5 * 10.0 ** (1 - 6)
 class _View:
     """Objects that evaluate the states of one problem.
 
-    Args:
-        problem: the discretised problem.
-        timed: True if the process time is a column.
-        columns: {name: quantity} of the user's columns.
-
     Attributes:
         columns: {name of a column: its quantity}.
         profiles: computes the `Profile` of a state.
@@ -261,16 +256,8 @@ class States:
     def _between(self, segment: Segment, left: State, right: State, target: Target, bound: Quantity) -> State:
         """Return the state that meets a target between two successive states, with its output quantities.
 
-        Args:
-            segment: the segment of both states.
-            left: the first of the two states.
-            right: the second of the two states.
-            target: the target.
-            bound: the output quantity of the target, for the problem of the segment.
-
-        Raises:
-            InputError: the stage controls an output quantity, so it cannot be restarted between states.
-            ConvergenceError: the solver did not converge.
+        `bound` is the quantity of the target in the problem. A stage that controls one is an InputError, no convergence
+        a ConvergenceError.
         """
         if segment.problem.has_history:                      # states between them depend on the history
             found = self._run_to(segment, left, right, target, bound)
@@ -388,11 +375,7 @@ class States:
         return self.record.describe(state)
 
     def _check(self, *names: str) -> None:
-        """Check that columns of these names exist.
-
-        Raises:
-            InputError: a name is not a column.
-        """
+        """Check that columns of these names exist; an InputError names the first that does not."""
         for name in names:
             if name not in self.columns:
                 raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")

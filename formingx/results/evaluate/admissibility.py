@@ -173,18 +173,9 @@ class AdmissibilityCheck:
     def _deepest(self, edges: np.ndarray, lengths: np.ndarray, state: State, on_face: bool) -> Iterator[Depth]:
         """Yield for each active tool of a section the deepest point of the boundary in it, if deeper than allowed.
 
-        Only edges that may contain such a point are examined. An edge is a parabola x(s), 0 <= s <= 1. Each of its
-        points is nearer than max |dx/ds| / 4 to an end or to the middle, whose depths are known.
-
-        Args:
-            edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
-            lengths: their lengths, shape (m,).
-            state: the state.
-            on_face: True to examine only the face that touches the tool; a tenth of the thickness (`CUT`) is allowed.
-                False to examine the whole boundary; the limit `AdmissibilityLimits.depth` is allowed.
-
-        Yields:
-            The point, its depth and the contact (`Depth`).
+        Edges (m, 3, 2) have first end, last end and middle, lengths (m,). A point of an edge is nearer than max |dx/ds|
+        / 4 to one of these, so most edges are skipped. `on_face` takes only the face towards the tool, with the limit
+        `CUT`.
         """
         a, b, middle = edges.transpose(1, 0, 2)
         slopes = np.linalg.norm([4 * middle - 3 * a - b, a - 4 * middle + 3 * b], axis=-1)
@@ -207,13 +198,7 @@ class AdmissibilityCheck:
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
         """Yield for each tool in three dimensions the deepest contact point, if it is deeper than allowed; collective.
 
-        Args:
-            state: the state.
-            allowed: function of a `FaceContact` that returns the allowed penetration of its n contact points, shape
-                (n,) or a number, length.
-
-        Yields:
-            The point, its depth and the contact (`Depth`).
+        `allowed` returns the limit of a `FaceContact` for its n contact points, shape (n,) or a number, length.
         """
         if self._problem.scene.kinematics.components < 3:
             return
@@ -227,18 +212,10 @@ class AdmissibilityCheck:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
 
     def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
-        """Yield for each tool of a section the edge with the largest ratio of penetration to deformed wall.
+        """Yield for each tool the edge with the largest penetration over wall, if it exceeds the limit.
 
-        It is yielded only if the ratio exceeds `AdmissibilityLimits.penetration`. The penetration of an edge is the
-        largest one of its three nodes. Only contacts whose contact points are nodes are examined.
-
-        Args:
-            edges: deformed boundary edges, (first end, last end, middle) of each, shape (m, 3, 2), length.
-            lengths: their lengths, shape (m,).
-            state: the state.
-
-        Yields:
-            The middle of the edge, its penetration and the contact (`Depth`).
+        Edges have shape (m, 3, 2), lengths (m,). The penetration is the largest one of three nodes; contact points must
+        be nodes.
         """
         weight, reference = self._problem.scene.kinematics.weight, self._outline.reference_edges
         for contact, face in zip(self._problem.contacts, self._faces):
@@ -254,22 +231,13 @@ class AdmissibilityCheck:
 
 
 def _depths(contact: Any, points: np.ndarray, state: State) -> np.ndarray:
-    """Return the depths of points in the tool of a contact in a state, shape (m, n), length; negative outside the tool.
-
-    Args:
-        contact: the `FaceContact`.
-        points: deformed positions, shape (m, n, components), length.
-        state: the state.
-    """
+    """Return the depths of points (m, n, components) in the tool of a contact, shape (m, n); negative outside."""
     positions = points - contact.tool_displacement(state.control)
     return contact.contact.tool.signed_distance(positions.reshape(-1, positions.shape[-1])).reshape(positions.shape[:2])
 
 
 def _allowed_penetration(contact: Any) -> np.ndarray:
-    """Return the allowed penetration of the n points of a `FaceContact` in three dimensions, shape (n,), length.
-
-    It is infinite for points that first touched in the last step: contact forces begin in the next step.
-    """
+    """Return the limits of depth of contact points in space, (n,), length; inf for those new in the last step."""
     allowed = _LIMITS.depth * np.maximum(contact.thickness, contact.rule.lengths)
     return np.where(contact.area < contact.rule.area, np.inf, allowed)
 
@@ -286,10 +254,7 @@ def _force_error(contact: Any, state: State, images: int) -> float:
     E/W is returned if it is below 0.02 %, a tenth of `WARNED_ERROR`, or if F or the change of t is 0. For a fixed tool
     0 is returned.
 
-    Args:
-        contact: the `FaceContact` with the tool.
-        state: the state, with the tangent of the path and the column "strain_energy" of the whole part.
-        images: factor from the modelled body to the whole part: 2 for a half, 4 for a quarter, else 1.
+    `state` has the column "strain_energy" of the whole part, which is `images` modelled bodies.
     """
     if not contact.contact.driven:
         return 0.0
@@ -308,22 +273,12 @@ def _force_error(contact: Any, state: State, images: int) -> float:
 
 
 def _penalty_advice(contact: Any, error: float) -> str:
-    """Return advice on a larger penalty as text.
-
-    Args:
-        contact: the `FaceContact`.
-        error: relative error of the tool force due to penetration (`_force_error`).
-    """
+    """Return advice on a larger penalty as text, from the relative error of the tool force."""
     return f"give Contact a penalty of {contact.contact.penalty * error / WARNED_ERROR * 10:.1g}"
 
 
 def _pulled(contact: Any, state: State) -> bool:
-    """Return True if the body pulls a frictionless moving tool forward along its travel; collective.
-
-    Args:
-        contact: the `FaceContact`.
-        state: the state.
-    """
+    """Return True if the body pulls a frictionless moving tool forward along its travel; collective."""
     law = contact.contact
     if not law.driven or not law.separates or law.friction_by_temperature or law.mu > 0:
         return False

@@ -53,10 +53,6 @@ class ContactFace:
 
     Creating it and all of its methods are collective.
 
-    Args:
-        path: the path whose states are evaluated.
-        contact: the `FaceContact`.
-
     Attributes:
         reference_points: reference positions of the n contact points, ordered by R, then Z, shape (n, 2), length.
         nodes: reference positions of the nodes of the face, edge by edge, shape (m, 2), length.
@@ -74,11 +70,7 @@ class ContactFace:
             self._reference_tangents = _tangents(self.reference_points[self._edges])
 
     def evaluate(self, state: Any) -> ContactTable:
-        """Return the contact quantities in a state of a section; pressure and friction are 0 if the tool is inactive.
-
-        Args:
-            state: a state on the mesh of the path.
-        """
+        """Return the contact quantities in a state of a section; 0 if the tool is inactive."""
         path, contact = self._path, self._contact
         with path.problem.state_context(state) as problem:
             fields = problem.x.array_r.copy()
@@ -97,15 +89,9 @@ class ContactFace:
         return ContactTable(self.reference_points, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
-        """Return deformed over reference area at each contact point, a node of the face.
+        """Return deformed over reference area at each contact point from deformed positions (n, 2), shape (n,).
 
         A node that two edges share gets the mean of the ratios of both edges.
-
-        Args:
-            points: deformed positions of the contact points, shape (n, 2), length.
-
-        Returns:
-            The area ratios, shape (n,).
         """
         n, reference, now = len(points), self.reference_points[self._edges], points[self._edges]
         ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._reference_tangents, axis=-1)
@@ -116,42 +102,23 @@ class ContactFace:
         return np.bincount(edges, ratio.ravel(), n) / np.maximum(np.bincount(edges, minlength=n), 1)
 
     def _gathered(self, *columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return data at the contact points of all ranks, ordered by R, then Z; collective.
-
-        Args:
-            columns: data at the n contact points of this rank, shape (n,) or (n, k) each.
-
-        Returns:
-            Reference positions of the m contact points of all ranks, shape (m, 2), length; their data, one row per
-            point and the given columns side by side, shape (m, all k).
-        """
+        """Return positions (m, 2) of all ranks ordered by R, then Z, and rows of data, (m, all k); collective."""
         rows = gathered(self._path.problem.comm, np.column_stack([self._contact.points, *columns]))
         rows, n = rows[np.lexsort((rows[:, 1], rows[:, 0]))], self._contact.points.shape[1]
         return rows[:, :n], rows[:, n:]
 
     def _edge_points(self) -> np.ndarray:
-        """Return the reference positions of both ends and the middle of each edge of the face, shape (m, 3, 2), length.
-
-        The edges of all ranks are returned; ghost edges occur twice. Collective.
-        """
+        """Return both ends and the middle of each edge on all ranks, ghosts twice, shape (m, 3, 2), length."""
         mesh = self._path.problem.scene.mesh
         X = gathered(mesh.comm, facet_node_positions(mesh.domain, mesh.facets_of(self._contact.contact.on)))
         return X if X.shape[1] == 3 else np.concatenate([X, X.mean(1, keepdims=True)], axis=1)      # straight edges
 
 
 def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
-    """Return the contacts of a tool.
+    """Return the `FaceContact` objects of a tool, one for each face.
 
-    Args:
-        path: the computed `Path`.
-        tool: name of the tool or of a face that touches it, the `Tool` or the `Contact`; None: the only tool.
-        caller: name of the calling method, for the message.
-
-    Returns:
-        The `FaceContact` objects of the tool, one for each face.
-
-    Raises:
-        InputError: there is no such tool, or there are several and `tool` is None.
+    The tool is a name of it or of a face, the `Tool`, the `Contact`, or None for the only one; any other is an
+    InputError.
     """
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
@@ -166,28 +133,11 @@ def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
 
 
 def tool_forces(path: Any) -> dict[str, np.ndarray]:
-    """Return the force of the body on each tool in all states.
-
-    The force on a moving tool is taken along its travel, positive if it resists the travel. The force on a fixed tool
-    is taken along Z, positive if the body pushes the tool up.
-
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        {tool: forces, shape (states,)}, stress length^2; in plane strain stress length.
-    """
+    """Return {tool: forces (states,)} of the body, along the travel, or Z for a fixed tool, stress length^2."""
     return {name: path[column] for name, column in Tooling.of_problem(path.problem).force_columns.items()}
 
 
 def _tangents(points: np.ndarray) -> np.ndarray:
-    """Return dx/ds at the two ends and the middle of m edges; s runs from 0 to 1 along an edge.
-
-    Args:
-        points: positions x of the first end, the last end and the middle, shape (m, 3, 2), length.
-
-    Returns:
-        Shape (m, 3, 2), length.
-    """
+    """Return dx/ds at both ends and the middle of m edges, s from 0 to 1, as their x, (m, 3, 2), length."""
     a, b, m = points[:, 0], points[:, 1], points[:, 2]
     return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)

@@ -34,15 +34,10 @@ class Crease(NamedTuple):
 
 
 def deepest(path: Any) -> Crease | None:
-    """Return the most compressed part of the faces that stick to tools in the last state of a `Path`; collective.
+    """Return the most compressed part of the faces that stick to tools in the last state; collective.
 
-    Parts nearer than a thickness to the outer end of the sheet are left out: that corner is singular if it is clamped.
-
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        The part; None without a sticking contact on a face of a solid sheet in a section.
+    Parts nearer than a thickness to the outer end are left out, since the corner of a clamp is singular. None without a
+    sticking contact in a section.
     """
     scene = path.problem.scene
     names = {contact.on for contact in scene.contacts if contact.sticks}
@@ -66,11 +61,7 @@ def deepest(path: Any) -> Crease | None:
 
 
 def findings(crease: Crease | None) -> list[Finding]:
-    """Return a warning in a list if a face creases; else an empty list.
-
-    Args:
-        crease: the most compressed part (`deepest`), or None.
-    """
+    """Return a warning in a list if a face creases; else an empty list."""
     if crease is None or crease.stretch >= _CREASED:
         return []
     return [Finding("warning", crease.face, f"Near (r, z) = ({crease.point[0]:.5g}, {crease.point[1]:.5g}) the face"

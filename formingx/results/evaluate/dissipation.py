@@ -17,13 +17,8 @@ def dissipated_energy(segment: Segment, states: list[State], power: Quantity) ->
     The third value lies between both states. There the unknowns are interpolated, and the history variables
     are advanced from the first state.
 
-    Args:
-        segment: the segment of the run with these states.
-        states: successive states, at least two, with the column "dissipated_power".
-        power: output quantity that evaluates the dissipated power of the whole part in the problem of the segment.
-
-    Returns:
-        The energy of the whole part, stress length^3; in plane strain stress length^2. It is 0 if no time passes.
+    The path has successive states of one segment, at least two, with the column "dissipated_power", which `power`
+    evaluates.
     """
     before, state = states[-2:]
     # with new step data only round-off is between the times: the body does not move

@@ -30,16 +30,8 @@ class SharpEdge(NamedTuple):
 def coarsest(path: Any, state: Any) -> SharpEdge | None:
     """Return the tool edge at which the tool normal turns most between two neighbouring contact points; collective.
 
-    Contacts that stick or never separate are not examined. Neighbours are contact points that follow each other when
-    they are ordered by the reference coordinate R, then Z. At least one of them must slide; a point with constrained
-    displacements does not count as sliding.
-
-    Args:
-        path: the computed `Path`.
-        state: a state on the last mesh of the path.
-
-    Returns:
-        The edge, or None if the body slides over no convex edge.
+    Points are ordered by R, then Z; one of two neighbours must slide. Sticking and inseparable contacts are left out.
+    None without such an edge.
     """
     found: list[SharpEdge] = []
     with path.problem.state_context(state) as problem:
@@ -69,14 +61,7 @@ def coarsest(path: Any, state: Any) -> SharpEdge | None:
 
 
 def findings(edge: SharpEdge | None) -> list[Finding]:
-    """Return a warning in a list if the elements are too large for the tool edge over which the body slides.
-
-    Args:
-        edge: the edge with the largest turn of the tool normal between contact points (`coarsest`), or None.
-
-    Returns:
-        A list with the warning; empty if the tool normal turns by less than 40 degrees, or without an edge.
-    """
+    """Return a warning in a list if the tool normal turns by 40 degrees or more between contact points; else []."""
     if edge is None or edge.turn < EDGE_ANGLE:
         return []
     return [Finding("warning", edge.tool, f"The body slides over an edge of {edge.tool!r} near (r, z) ="

@@ -88,12 +88,7 @@ class Filling(ColumnTable):
 def filling(path: Any, contact: Any) -> Filling:
     """Return the remaining gaps in the corners of a tool, state by state (`Path.filling`); collective.
 
-    Args:
-        path: the computed `Path` of a run on one mesh.
-        contact: the `FaceContact` of the tool.
-
-    Raises:
-        InputError: the tool has no corner that the body must fill.
+    A tool without a corner that the body must fill is an InputError.
     """
     from ...contact.tooling import Tooling
     tooling = Tooling.of_problem(path.problem)
@@ -115,14 +110,9 @@ def filling(path: Any, contact: Any) -> Filling:
 
 
 def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
-    """Return the concave fillets and sharp concave corners of a tool, which the body must fill.
+    """Return (`Corner`, points on it (m, 2), length) of the concave fillets and sharp corners of a tool.
 
-    Args:
-        tool: the tool, before it moves.
-
-    Returns:
-        For each corner a pair (`Corner`, points (r, z) on it, shape (m, 2), length). A fillet has m = 17 points, a
-        sharp corner m = 1.
+    A fillet has m = 17 points, a sharp corner m = 1. The tool has not moved.
     """
     found = []
     pieces = list(tool.pieces)

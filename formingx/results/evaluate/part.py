@@ -82,17 +82,8 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
          heights: Sequence[float] = (), units: Units = NONE, planes: MirrorPlanes = NO_PLANES) -> Part:
     """Return the key numbers of a part (`Path.part`).
 
-    Args:
-        wall: the wall in a state.
-        axisymmetric: False in plane strain.
-        density: density of the material for the weight, g/cm3; None: no weight.
-        trim: radius r, or ("height", h), at which the part is cut off, length; None: not cut.
-        heights: axial distances from the pole (`Wall.height`) at which `Part.walls` has the wall, length.
-        units: units of the script.
-        planes: symmetry planes at which only a half or a quarter of the part is modelled.
-
-    Raises:
-        InputError: the part does not reach the trim or a height.
+    The density is in g/cm3, trim radius or ("height", h) and heights are lengths, and `planes` are symmetry planes of a
+    modelled half or quarter. A trim or height out of reach is an InputError.
     """
     profile, images = wall.profile, planes.factor
     basis = planes.basis(None if axisymmetric else units.length or "unit")
@@ -128,15 +119,8 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
     """Return the fraction, 0 to 1, of each strip of the wall that belongs to the trimmed part, shape (n - 1,).
 
-    A strip lies between two successive nodes. On its way from the axis to the rim, the middle line may pass the trim
-    several times. The cut lies where it passes to a larger radius or height for the last time.
-
-    Args:
-        wall: the wall at n nodes, from the axis to the rim.
-        trim: radius r, or ("height", h), at which the part is cut off, length; None: not cut.
-
-    Raises:
-        InputError: the part does not reach the trim.
+    The cut lies where the middle line passes the trim, radius r or ("height", h), for the last time. A trim out of
+    reach is an InputError.
     """
     inside = np.ones(len(wall.r) - 1)
     if trim is None:
@@ -154,12 +138,9 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
 
 
 def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
-    """Return the volume inside the inner face of a part, length^3; in plane strain per unit depth, length^2.
+    """Return the volume inside the inner face, length^3; in plane strain per depth.
 
-    Args:
-        wall: the wall at n nodes.
-        inside: fraction of each strip, between two successive nodes, that belongs to the part, shape (n - 1,).
-        axisymmetric: False in plane strain.
+    `inside` is the fraction of each strip that belongs to the part, shape (n - 1,).
     """
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
@@ -173,13 +154,8 @@ def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool, start: np.n
             end: np.ndarray | None = None) -> np.ndarray:
     """Return the volumes of the m - 1 strips between two lines, length^3; in plane strain per unit depth, length^2.
 
-    Args:
-        bottom: points (r, z) of a line, shape (m, 2), length.
-        top: points of the other line opposite them, shape (m, 2), length.
-        axisymmetric: False in plane strain.
-        start: points from the first bottom to the first top point, to which the first strip extends, shape (k, 2),
-            length; None: the straight line between them.
-        end: the same from the last bottom to the last top point.
+    Lines have points (m, 2), length. The first and last strip extend to lines `start` and `end`, shape (k, 2); None is
+    straight.
     """
     corners = [bottom[:-1], bottom[1:], top[1:], top[:-1]]
     total = np.zeros(len(bottom) - 1)
@@ -195,35 +171,17 @@ def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool, start: np.n
 
 
 def _up_to(a: np.ndarray, b: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return the volumes inside the cones that n straight lines sweep about the axis, shape (n,), length^3.
-
-    A volume is positive if b lies above a.
-
-    Args:
-        a: first end (r, z) of each line, shape (n, 2), length.
-        b: second end (r, z) of each line, shape (n, 2), length.
-        axisymmetric: False in plane strain, where the areas between each line and r = 0 are returned, length^2.
-    """
+    """Return volumes of cones swept by lines from a to b, (n, 2) each, (n,), length^3; areas in plane strain."""
     (r, z), (s, w) = a.T, b.T
     return np.pi / 3 * (r * r + r * s + s * s) * (w - z) if axisymmetric else (r + s) / 2 * (w - z)
 
 
 def _surface(line: np.ndarray, axisymmetric: bool) -> np.ndarray:
-    """Return the areas that the pieces of a polyline sweep about the axis, shape (m - 1,), length^2.
-
-    Args:
-        line: points (r, z), shape (m, 2), length.
-        axisymmetric: False in plane strain, where the lengths of the pieces are returned.
-    """
+    """Return areas swept by pieces of a polyline (m, 2), shape (m - 1,), length^2; lengths in plane strain."""
     length = np.hypot(*np.diff(line, axis=0).T)
     return np.pi * (line[1:, 0] + line[:-1, 0]) * length if axisymmetric else length
 
 
 def _sums(fine_values: np.ndarray, nodes: int) -> np.ndarray:
-    """Return the sums of values over the pieces between neighbouring nodes, shape (nodes - 1,).
-
-    Args:
-        fine_values: values on equal numbers of subdivisions of each piece, in order, shape (k,).
-        nodes: number of nodes.
-    """
+    """Return sums (nodes - 1,) of equally many values (k,) on the pieces between nodes."""
     return fine_values.reshape(nodes - 1, -1).sum(1)

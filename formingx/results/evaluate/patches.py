@@ -20,12 +20,8 @@ class Patches:
     """Least-squares fits of cubics to values at quadrature points, for m of the n cells of a mesh.
 
     The cubic of a cell is fitted to the values in its patch: the cells of the same layer that share a corner with it.
-
-    Args:
-        points: q quadrature points (R, Z) of each of the n cells, shape (n, q, 2), length.
-        corners: node numbers of the corners of each cell, shape (n, 3).
-        layer: number of the layer of each cell, shape (n,).
-        fitted: numbers of the m cells whose patches are fitted, shape (m,).
+    Points (R, Z) have shape (n, q, 2), length, corners of cells (n, 3), their layers (n,), and the cells to be fitted
+    (m,).
     """
 
     def __init__(self, points: np.ndarray, corners: np.ndarray, layer: np.ndarray, fitted: np.ndarray):
@@ -48,14 +44,7 @@ class Patches:
         self._operators: dict[int, np.ndarray] = {}
 
     def fit(self, values: np.ndarray) -> np.ndarray:
-        """Fit a cubic in (R, Z) to each of k fields, on the patch around each of the m fitted cells.
-
-        Args:
-            values: values of the fields at the q quadrature points of each of the n cells of the mesh, shape (n, q, k).
-
-        Returns:
-            The coefficients of the cubics, shape (m, 10, k).
-        """
+        """Fit cubics in (R, Z) to values (n, q, k) on the patch of each cell; coefficients (m, 10, k)."""
         found = np.zeros((len(self._patch), len(_POWERS), values.shape[-1]))
         for chunk in self._chunks():
             patch = self._patch[chunk]
@@ -63,14 +52,9 @@ class Patches:
         return found
 
     def _operator(self, chunk: slice) -> np.ndarray:
-        """Return matrices that map the values at the quadrature points of a patch to the coefficients of its cubic.
+        """Return matrices from values at the points of a patch to its cubic, shape (cells of the slice, 10, points).
 
-        Args:
-            chunk: slice of the m cells.
-
-        Returns:
-            One matrix per cell, shape (cells of the slice, 10, points of the largest patch). If a patch has fewer
-            points, its last columns are 0.
+        The last columns are 0 for a patch with fewer points than the largest.
         """
         if chunk.start in self._operators:
             return self._operators[chunk.start]
@@ -84,27 +68,11 @@ class Patches:
         return operator
 
     def evaluate(self, coefficients: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return the values of the cubics of the m cells at points, for k fields.
-
-        Args:
-            coefficients: coefficients of the cubics from `fit`, shape (m, 10, k).
-            points: p points (R, Z) in each of the m cells, shape (m, p, 2), length.
-
-        Returns:
-            The values, shape (m, p, k), in the units of the fitted fields.
-        """
+        """Return the values of cubics (m, 10, k) at p points (m, p, 2) of each of the m cells, shape (m, p, k)."""
         return self._basis(slice(None), points) @ coefficients
 
     def _basis(self, chunk: slice, points: np.ndarray) -> np.ndarray:
-        """Return the ten monomials of a cubic at points, shape (cells, ..., 10).
-
-        Their coordinates R and Z have the mean quadrature point of the cell as origin. Each is divided by its largest
-        magnitude at the quadrature points of the patch.
-
-        Args:
-            chunk: slice of the m cells.
-            points: points (R, Z) for each cell of the slice, shape (cells, ..., 2), length.
-        """
+        """Return the ten monomials of a cubic at points (cells, ..., 2), shape (cells, ..., 10). """
         between = (slice(None), *[None] * (points.ndim - 2))
         x = (points - self._origin[chunk][between]) / self._size[chunk][between]
         powers = np.stack([np.ones_like(x), x, x * x, x * x * x], axis=-1)        # (..., coordinate, power)

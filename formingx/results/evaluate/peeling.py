@@ -30,12 +30,7 @@ class Peeling(NamedTuple):
 def strongest(problem: Any, states: Sequence[Any]) -> Peeling | None:
     """Return the tool with the largest ratio of tangential to normal contact forces; collective.
 
-    Args:
-        problem: the `Problem` of the states.
-        states: the states (`State`) to be examined.
-
-    Returns:
-        The tool; None if no sheet sticks to a tool from which it may separate.
+    None if no sheet sticks to a tool from which it may separate.
     """
     found = []
     for state in states:
@@ -63,9 +58,5 @@ def findings(item: Peeling | None) -> list[Finding]:
 
 @register("failure")
 def peeled(failure: Any) -> list[Finding]:
-    """Find a sheet that was peeled off a tool, to which it sticks, in the last state of a failed run; collective.
-
-    Args:
-        failure: the failed run, with its `problem` and its `last` state.
-    """
+    """Find a sheet that was peeled off a tool to which it sticks, in a failed run's last state; collective."""
     return findings(strongest(failure.problem, [failure.last])) if failure.last else []

@@ -161,12 +161,7 @@ class Profile:
 
 
 def whole_part(profile: Profile, planes: MirrorPlanes) -> Profile:
-    """Return the profile of the whole part, of which a half or a quarter is modelled.
-
-    Args:
-        profile: profile of the modelled body.
-        planes: its mirror planes.
-    """
+    """Return the profile of the whole part from that of its half or quarter and the mirror planes."""
     for plane in planes.planes:
         profile = _joined_with_image(profile, plane, max(planes.near, SAME_PLACE * float(np.ptp(profile.bottom))))
     return profile
@@ -175,10 +170,7 @@ def whole_part(profile: Profile, planes: MirrorPlanes) -> Profile:
 def _joined_with_image(profile: Profile, plane: MirrorPlane, near: float) -> Profile:
     """Return a profile joined with its mirror image; unchanged if neither an end nor a face lies in the plane.
 
-    Args:
-        profile: the profile.
-        plane: the mirror plane.
-        near: tolerance of positions, length.
+    `near` is the tolerance of positions, length.
     """
     def image(points: np.ndarray) -> np.ndarray:
         """Return the mirror images of points, shape (n, 2), length."""
@@ -206,15 +198,7 @@ def _joined_with_image(profile: Profile, plane: MirrorPlane, near: float) -> Pro
 
 
 def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the shortest distance of each point from a polyline.
-
-    Args:
-        points: positions, shape (m, 2), length.
-        line: corners of the polyline, shape (n, 2), length.
-
-    Returns:
-        The distances, shape (m,), length.
-    """
+    """Return the distance of points (m, 2) from a polyline (n, 2), shape (m,), length."""
     a, b = line[:-1], line[1:]
     fraction = np.einsum("mij,ij->mi", points[:, None] - a, b - a) / np.einsum("ij,ij->i", b - a, b - a)
     offset = points[:, None] - a - np.clip(fraction, 0, 1)[..., None] * (b - a)
@@ -224,8 +208,7 @@ def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 class Profiles:
     """Computes the `Profile` of a sheet in states of one problem.
 
-    Args:
-        problem: the discretised problem. Its mesh has the boundaries `bottom` and `top`, or `inner` and `outer`.
+    The mesh has the boundaries `bottom` and `top`, or `inner` and `outer`.
     """
 
     def __init__(self, problem: Any):
@@ -233,11 +216,7 @@ class Profiles:
         self._probe: Probe | None = None
 
     def evaluate(self, state: Any) -> Profile:
-        """Return the profile of a state; collective.
-
-        Raises:
-            InputError: the mesh has no pair of faces, or the sheet is in three dimensions.
-        """
+        """Return the profile of a state; collective. A mesh without pair of faces, or in space, is an InputError."""
         self._probe = faces = self._probe or self._make_probe()
         deformed = faces.points + faces.displacement_in(state)
         n = (len(faces.points) - 2 * _EDGE_POINTS) // 2
@@ -247,8 +226,7 @@ class Profiles:
     def _make_probe(self) -> Probe:
         """Return the `Probe` of the displacements at the bottom points, the top points, the start and the end.
 
-        Raises:
-            InputError: the mesh has no pair of faces, or the sheet is in three dimensions.
+        A mesh without a pair of faces, or a sheet in three dimensions, is an InputError.
         """
         mesh = self._problem.scene.first.mesh
         if self._problem.scene.kinematics.components == 3:
@@ -288,15 +266,7 @@ def _edge_points(mesh: Any, faces: tuple[str, str], bottom: np.ndarray, top: np.
 
 
 def refined(line: np.ndarray, parts: int = 6) -> np.ndarray:
-    """Return points along the curved edges of quadratic elements; each edge is a parabola through its three nodes.
-
-    Args:
-        line: nodes along successive edges: end, middle, end, middle, ..., end, shape (n, 2), length.
-        parts: number of equal parameter intervals into which each edge is divided.
-
-    Returns:
-        Points in order, shape (parts (n - 1) / 2 + 1, 2), length.
-    """
+    """Return points on parabolic edges with nodes (n, 2), `parts` intervals each, ((n - 1) / 2 parts + 1, 2)."""
     a, m, b = line[:-1:2, None], line[1::2, None], line[2::2, None]
     xi = np.linspace(0, 1, parts, endpoint=False)[:, None]
     inner = (1 - xi) * (1 - 2 * xi) * a + 4 * xi * (1 - xi) * m + xi * (2 * xi - 1) * b
@@ -306,12 +276,8 @@ def refined(line: np.ndarray, parts: int = 6) -> np.ndarray:
 def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return for each node of a face the point at which its normal meets the other face, shape (n, 2), length.
 
-    The ends of one face are opposite the ends of the other. If a normal beside an oblique rim misses the other face,
-    the nearest end of that face is returned.
-
-    Args:
-        line: nodes along the face: end, middle, end, ..., shape (n, 2), length.
-        other: nodes along the other face in the same direction, shape (m, 2), length.
+    Both faces have nodes end, middle, end, ... in the same direction, (n, 2) and (m, 2). Ends are opposite ends; a
+    normal that misses takes the nearest end.
     """
     a, m, b = line[:-1:2], line[1::2], line[2::2]          # tangents of the parabola through an edge's nodes
     tangent = np.zeros_like(line)

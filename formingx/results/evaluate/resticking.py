@@ -37,15 +37,8 @@ class Resticking(NamedTuple):
 def furthest(path: Any) -> Resticking | None:
     """Return the contact point with the largest shift of its sticking position on a tool; collective.
 
-    A point shifts if it separates and sticks again at another position. The shift over the tributary length of the
-    point (`Resticking.shift`) is the change of the strain beside the point. Whether a point separates may depend on
-    small changes of the forces. So the shift is an upper bound of the error of the wall due to the step lengths.
-
-    Args:
-        path: the computed `Path`. In a remeshed run only the states on the last mesh are examined.
-
-    Returns:
-        The point, or None if no point stuck again.
+    It separates and sticks again elsewhere, on the last mesh. The shift over its tributary length is an upper bound of
+    the wall error by step lengths. None without any.
     """
     found = []
     for number, contact in enumerate(c for c in path.problem.contacts if c.has_history):   # contacts come first
@@ -64,14 +57,9 @@ def furthest(path: Any) -> Resticking | None:
 
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
-    """Return the shifts of the sticking positions of the n contact points that this rank owns, shape (n,).
+    """Return the summed shifts of the sticking positions over tributary lengths of n owned points, (n,).
 
-    A point shifts if it separates and sticks again at another position on the tool. The distances of all its shifts
-    are added, and divided by the tributary length of the point.
-
-    Args:
-        contact: the `FaceContact`.
-        touches: `ContactHistory` of these points in successive states.
+    `touches` has the `ContactHistory` of these points in successive states.
     """
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
@@ -87,9 +75,6 @@ def findings(item: Resticking | None) -> list[Finding]:
     """Return a note or a warning in a list if a sticking position shifted by 0.003 tributary lengths or more; else [].
 
     The numbers of the note are results of benchmarks/steps_in_moulds.py.
-
-    Args:
-        item: the contact point with the largest shift from one sticking position to the next, or None.
     """
     if item is None or item.shift < WALL_ERROR:
         return []

@@ -35,16 +35,9 @@ class Snap(NamedTuple):
 
 
 def largest(path: Any) -> Snap | None:
-    """Return the snap-through of a path in which the wall changed most; collective.
+    """Return the snap-through of a path in which the wall changed most, or None; collective.
 
-    Only problems with history variables are examined, for example with friction or viscoelasticity. There the state
-    after a snap-through depends on the motion to it.
-
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        The snap-through, or None if there was none, or if the body is not a sheet with a wall.
+    Only problems with history variables are examined: there the state after a snap-through depends on the motion to it.
     """
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
     if not jumps or not path.problem.has_history:
@@ -65,11 +58,7 @@ def largest(path: Any) -> Snap | None:
 
 
 def findings(snap: Snap | None) -> list[Finding]:
-    """Return a warning in a list if the wall changed by 5 % or more in a snap-through; else an empty list.
-
-    Args:
-        snap: the snap-through in which the wall changed most (`largest`), or None.
-    """
+    """Return a warning in a list if the wall changed by 5 % or more in a snap-through; else an empty list."""
     if snap is None or snap.change < LARGE_ERROR:
         return []
     times = f"{snap.jumps} times, most" if snap.jumps > 1 else "once,"

@@ -27,15 +27,9 @@ class Polynomial(NamedTuple):
 
 
 def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomial:
-    """Return the polynomial with given values at s = 0 and s = 1, and with given slopes there, if any.
+    """Return the polynomial with values a, b at s = 0 and 1, and with slopes `start`, `end` there, if any.
 
-    It is a cubic with two slopes, a parabola with one, and a straight line without slopes.
-
-    Args:
-        a: value at s = 0, a number or an array.
-        b: value at s = 1.
-        start: derivative at s = 0; None: not given.
-        end: derivative at s = 1; None: not given.
+    It is a cubic with two slopes, a parabola with one, and a straight line without.
     """
     change = b - a
     if start is None and end is None:
@@ -53,8 +47,6 @@ def integral(f: Polynomial, y: Polynomial) -> float:
     .. math::
         \int_0^1 \sum_i f_i \, \frac{dy_i}{ds} \, ds
 
-    Args:
-        f: the force as a polynomial; its values are numbers or arrays with entries f_i.
-        y: the travel as a polynomial, with values of the same shape.
+    Values of both polynomials are numbers, or arrays of the same shape.
     """
     return float(sum(w * np.sum(f.value(s) * y.slope(s)) for s, w in zip(*GAUSS)))

@@ -200,11 +200,7 @@ class StressField:
 
 
 class Stresses:
-    """Computes the `StressField` of states of one problem; forms and mass matrix are created at first use.
-
-    Args:
-        problem: the discretised problem.
-    """
+    """Computes the `StressField` of states of one problem; forms and mass matrix are created at first use."""
 
     def __init__(self, problem: Any):
         self.problem = problem
@@ -214,30 +210,16 @@ class Stresses:
         self._located: dict[str, tuple[np.ndarray, LocatedPoints]] = {}
 
     def evaluate(self, state: Any) -> StressField:
-        """Return the stresses of a state; collective.
-
-        Raises:
-            InputError: the body is a membrane.
-        """
+        """Return the stresses of a state; collective. A membrane raises an InputError."""
         if not self._ready:
             self._prepare()
             self._ready = True
         return StressField(self, state)
 
     def locate(self, points: np.ndarray, layer: str) -> LocatedPoints:
-        """Return the cells of a layer that contain points; collective.
+        """Return the cells of a layer that contain reference points (n, 2), length; collective.
 
-        The last result for each layer is stored, and returned again for the same points.
-
-        Args:
-            points: reference positions (R, Z), shape (n, 2), length.
-            layer: name of the layer.
-
-        Returns:
-            The points that lie in cells of this rank, with their cells and positions in the reference cell.
-
-        Raises:
-            InputError: a point lies outside the layer.
+        The last result of each layer is stored. A point outside the layer is an InputError.
         """
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
@@ -247,11 +229,7 @@ class Stresses:
         return before[1]
 
     def layer(self, name: str | None) -> str:
-        """Check the name of a layer and return it; for None the name of the only layer.
-
-        Raises:
-            InputError: there is no such layer, or there are several and `name` is None.
-        """
+        """Return the checked name of a layer, for None that of the only layer; otherwise an InputError."""
         if name is None:
             if len(self.cells) > 1:
                 raise InputError(f"stress: which layer? known: {', '.join(map(repr, self.cells))}")
@@ -274,18 +252,7 @@ class Stresses:
         return total[0] / total[1]
 
     def project(self, state: Any, pressures: np.ndarray) -> np.ndarray:
-        """Return nodal values of the deformation gradient F and the second Piola-Kirchhoff stress S of a state.
-
-        F and S plus p J C^-1, with the pressure p of the layer, are projected on piecewise linear fields, one for each
-        layer. Collective.
-
-        Args:
-            state: the state.
-            pressures: pressure of each layer, shape (layers,), stress.
-
-        Returns:
-            F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop, shape (nodes, layers, 9), with ghost nodes.
-        """
+        """Return nodal F and S of a state, 9 entries, shape (nodes, layers, 9), by linear fields; collective."""
         self._pressures.value[:] = pressures
         with self.problem.state_context(state):
             return self._projected()
@@ -329,25 +296,14 @@ class Stresses:
         return Fitted(points, volume, _cauchy(values), smooth, cubics, pressures)
 
     def _fitted_cauchy(self, cubics: np.ndarray, pressures: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return the Cauchy stress of fitted cubics at q points of each of m cells, shape (m, q, 3, 3), stress.
-
-        Args:
-            cubics: coefficients of the cubics, shape (m, 10, 9).
-            pressures: pressures of the layers of the cells, shape (m,), stress.
-            points: reference positions of the points, shape (m, q, 2), length.
-        """
+        """Return the Cauchy stress (m, q, 3, 3) of cubics (m, 10, 9) and pressures (m,) at points (m, q, 2)."""
         assert self._patches is not None
         return _cauchy(_shifted(self._patches.evaluate(cubics, points), -pressures[:, None]))
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
-        """Return for each of this rank's m cells the largest fitted principal Cauchy stress at its corners.
+        """Return the largest principal Cauchy stress at corners of cells, (m,), and the corners, (m, 2), length.
 
-        Args:
-            fitted: computed and fitted stresses of these cells, from `fit`.
-
-        Returns:
-            The stresses, shape (m,), and the reference positions (R, Z) of the corners at which they occur, shape
-            (m, 2), length.
+        The stresses are those fitted in `fit`, for the m cells of this rank.
         """
         owned = own_cells(self.problem.forms.domain)
         X = cell_node_positions(self.problem.forms.domain, owned)[:, :3]
@@ -356,14 +312,7 @@ class Stresses:
         return largest[top], X[top]
 
     def of_layer(self, name: str | None) -> np.ndarray:
-        """Return a mask of the cells that this rank owns, shape (m,): True if a cell lies in a layer.
-
-        Args:
-            name: name of the layer; None: all layers.
-
-        Raises:
-            InputError: the layer is unknown.
-        """
+        """Return a mask of owned cells in a layer, (m,); None: all layers."""
         owned = own_cells(self.problem.forms.domain)
         return np.isin(owned, self.cells[self.layer(name)]) if name is not None else np.ones(len(owned), dtype=bool)
 
@@ -374,9 +323,8 @@ class Stresses:
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return F, S and volumes at the q quadrature points of each of this rank's m cells of a layer in a state.
 
-        Returns:
-            Reference positions (R, Z), shape (m, q, 2), length. F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz and
-            S_hoop, (m, q, 9). Reference volumes (quadrature weights), (m, q), length^3, in plane strain length^2.
+        Positions have shape (m, q, 2), length; F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop (m, q, 9);
+        volumes (m, q), length^3 or, in plane strain, length^2.
         """
         forms = self.problem.forms
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
@@ -402,13 +350,9 @@ class Stresses:
         return where[..., :-1], values, where[..., -1] * weights
 
     def _parts(self, names: list[str]) -> list[tuple[Any, dict]]:
-        """Return the terms whose sum is the second Piola-Kirchhoff stress S: the material's, then the volume term.
+        """Return the terms of the stress S: the material's, then the volume term, for layers of one material.
 
-        Args:
-            names: names of the layers, which have one material.
-
-        Returns:
-            For each term a pair (list of S_rr, S_rz, S_zz, S_hoop in UFL, quadrature metadata of its integral).
+        Each is (list of S_rr, S_rz, S_zz, S_hoop in UFL, quadrature metadata of its integral).
         """
         F = ufl.variable(self.problem.forms.F)
         parts = []
@@ -476,12 +420,7 @@ class Stresses:
 
 
 def _shifted(values: np.ndarray, pressure: Any) -> np.ndarray:
-    """Return values of F and S, shape (..., 9), with S + p J C^-1 in place of S.
-
-    Args:
-        values: F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop, shape (..., 9).
-        pressure: the pressure p, of a shape that fits (...), stress.
-    """
+    """Return F and S, shape (..., 9), with S + p J C^-1 in place of S, for pressures p that fit (...), stress."""
     (a, b, c, d, hoop), found = np.moveaxis(values[..., :len(BLOCK)], -1, 0), values.copy()
     det = a * d - b * c
     # J C^-1 = J F^-1 F^-T, with J = det hoop
@@ -492,11 +431,7 @@ def _shifted(values: np.ndarray, pressure: Any) -> np.ndarray:
 
 
 def _cauchy(values: np.ndarray) -> np.ndarray:
-    """Return the Cauchy stress at q points of each of m cells, shape (m, q, 3, 3), stress.
-
-    Args:
-        values: F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop at the points, shape (m, q, 9).
-    """
+    """Return the Cauchy stress (m, q, 3, 3) of the nine entries of F and S, shape (m, q, 9)."""
     flat = values.reshape(-1, _COUNT)
     return _unpack(np.zeros((len(flat), COORDINATES)), flat).cauchy.reshape(*values.shape[:2], 3, 3)
 

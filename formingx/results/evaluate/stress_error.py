@@ -140,12 +140,8 @@ class Fitted(NamedTuple):
     def error(self, exact: Callable | None = None) -> StressError:
         """Return the errors of the computed stress in this rank's cells: its differences from a more accurate stress.
 
-        Args:
-            exact: function that returns the exact Cauchy stress, shape (n, 3, 3), at reference positions, shape (n, 2);
-                default: the fitted stress takes its place.
-
-        Raises:
-            InputError: `exact` is not a function, or returns another shape.
+        The `exact` stress is a function of positions (n, 2) with shape (n, 3, 3); default the fitted one. Another type
+        or shape is an InputError.
         """
         better = self.smooth
         if exact is not None:

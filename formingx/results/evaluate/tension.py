@@ -49,8 +49,7 @@ class Tension:
 
     The resultants of all layers are added.
 
-    Args:
-        problem: discretised problem of a scene whose model is a `Membrane`.
+    The problem has a scene whose model is a `Membrane`.
     """
 
     def __init__(self, problem: Any):
@@ -77,12 +76,7 @@ class Tension:
         return Resultant(("meridional", "hoop")[i], float(values[k, i]), (float(values[k, 2]), float(values[k, 3])))
 
     def hoop(self, state: Any) -> tuple[np.ndarray, np.ndarray]:
-        """Return the hoop resultants along a membrane in a state, from the axis to the rim; collective.
-
-        Returns:
-            Reference positions (R, Z) of the n quadrature points, ordered by R, shape (n, 2), length; hoop forces per
-            reference length of the meridian, positive in tension, shape (n,), stress * length.
-        """
+        """Return positions (n, 2) and hoop forces per reference length (n,) from axis to rim; collective."""
         values = self._values(state)
         values = values[np.argsort(values[:, 2])]
         return values[:, 2:4], values[:, 4]
@@ -101,13 +95,9 @@ class Tension:
 
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:
-    """Return the first state of a path in which a membrane in a section is compressed; collective.
+    """Return the number of the first state in which a membrane in a section is compressed, and its resultant.
 
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        Number of the state and its smallest resultant; None without compression or without a membrane.
+    The smallest resultant is meant; None without compression or without a membrane. Collective.
     """
     k = 0
     for segment in path.segments:
@@ -122,11 +112,7 @@ def first_compression(path: Any) -> tuple[int, Resultant] | None:
 
 
 def findings(first: tuple[int, Resultant] | None) -> list[Finding]:
-    """Return a finding on the first compression of a membrane in a list; empty without compression.
-
-    Args:
-        first: number of the state and its smallest resultant (`first_compression`), or None.
-    """
+    """Return a finding on the first compression of a membrane in a list; empty without compression."""
     if first is None:
         return []
     k, (direction, value, point) = first

@@ -20,14 +20,7 @@ _MAX_VOLUME_RATIO = 2.0
 def findings(error: float, where: str, far_error: float | None = None) -> list[Finding]:
     """Return a finding in a list if the root mean square of J - 1 exceeds 0.005 in a state; else an empty list.
 
-    The finding is a warning above 0.02, else a note. It is a note as well if only the corners of clamped faces
-    contribute to the error.
-
-    Args:
-        error: root mean square of J - 1 over the body.
-        where: name of the state, for the message.
-        far_error: root mean square of J - 1 away from clamped faces (`away_from_clamps`); None if it is unknown or
-            nothing is clamped.
+    Above 0.02 it is a warning, unless `far_error`, away from clamped faces, is small; `where` names the state.
     """
     if error <= NOTICEABLE:
         return []
@@ -42,31 +35,13 @@ def findings(error: float, where: str, far_error: float | None = None) -> list[F
 
 
 def away_from_clamps(path: Any) -> float | None:
-    """Return the root mean square of J - 1 in the last state of a path away from clamped faces; collective.
-
-    The effect of the singular corners of a clamped face decays over the length of the face, which is the wall of a
-    sheet (Saint-Venant). Points nearer to a clamped face than twice this length are left out.
-
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        The root mean square, or None without clamped faces.
-    """
+    """Return the root mean square of J - 1 in the last state away from clamps, or None without; collective."""
     faces, reach = _clamped(path)
     return path.problem.volume_error_away(path.last, faces, reach) if len(faces) else None
 
 
 def _clamped(path: Any) -> tuple[np.ndarray, float]:
-    """Return the nodes of the clamped faces of a solid, and the distance within which their corners affect J.
-
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        Reference positions, shape (n, 2), length; twice the length of the longest clamped face, length. Without a
-        clamped face n and the length are 0.
-    """
+    """Return the nodes of clamped faces, (n, 2), and twice the length of the longest face, length."""
     scene = path.problem.scene
     clamped = [support.on for support in scene.supports if isinstance(support, Clamped)] if scene.model.solid else []
     faces = [scene.mesh.nodes_of(name) for name in clamped]
@@ -77,11 +52,8 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
 def extreme_ratio(path: Any) -> list[Finding]:
     """Return a finding in a list if J is not between 1/2 and 2 somewhere in the last state; else an empty list.
 
-    J is examined at the quadrature points, at the points of the rule of the next higher degree, and at the middles of
-    the edges. The finding is a warning for J <= 0 away from clamped faces, else a note. Collective.
-
-    Args:
-        path: the computed `Path`.
+    J is examined at quadrature points, also of the next higher degree, and at middles of edges. J <= 0 away from clamps
+    is a warning. Collective.
     """
     furthest = path.problem.extreme_volume_ratio(path.last)
     J = 1.0 if furthest is None else furthest.value

@@ -103,11 +103,7 @@ class Wall(ColumnTable):
 
 
 class Walls:
-    """Computes the `Wall` of the states of a path.
-
-    Args:
-        path: the path whose states are evaluated.
-    """
+    """Computes the `Wall` of the states of a path."""
 
     def __init__(self, path: Any):
         self._path = path
@@ -116,8 +112,7 @@ class Walls:
     def evaluate(self, state: Any) -> Wall:
         """Return the wall in a state; collective.
 
-        Raises:
-            InputError: the body is not a sheet, or its layers do not lie above each other.
+        A body that is no sheet, or whose layers do not lie above each other, is an InputError.
         """
         path, profile = self._path, self._path.profile(state)
         names = list(path.problem.scene.mesh.layers)
@@ -136,20 +131,10 @@ class Walls:
 
 
 def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
-    """Return the points at which straight lines across a sheet cross the k interfaces of its layers.
+    """Return the k + 1 layers from the bottom up, and the points between them on n lines across, (k, n, 2), length.
 
-    Each line goes from a bottom point to the opposite top point, in the reference configuration.
-
-    Args:
-        mesh: the mesh.
-        profile: outline of the sheet with n pairs of opposite points.
-
-    Returns:
-        Names of the k + 1 layers from the bottom up, and the reference positions of the crossings, interface by
-        interface, shape (k, n, 2), length.
-
-    Raises:
-        InputError: the layers do not lie above each other.
+    Reference lines go from the bottom points of the profile to the opposite top points. Layers that do not lie above
+    each other are an InputError.
     """
     if len(mesh.layers) == 1:
         return list(mesh.layers), np.zeros((0, *profile.reference_bottom.shape))
@@ -170,11 +155,9 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
 
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
-    """Return the interfaces between layers as straight pieces, equal on all ranks; collective.
+    """Return the straight pieces of the interfaces between two named layers, equal on all ranks; collective.
 
-    Returns:
-        {(name of a layer, name of the other layer): reference positions of both ends of each piece, shape (m, 2, 2),
-        length}.
+    The reference positions of both ends have shape (m, 2, 2), length.
     """
     domain, topology = mesh.domain, mesh.domain.topology
     topology.create_connectivity(1, 2)
@@ -197,15 +180,9 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
 
 
 def _crossing(start: np.ndarray, direction: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Return the parameters s at which lines x = start + s direction first meet straight pieces, shape (n,).
+    """Return s at which lines start + s direction, (n, 2) each, first meet pieces (m, 2, 2), shape (n,).
 
-    Args:
-        start: starts of the lines, shape (n, 2), length.
-        direction: directions of the lines, shape (n, 2), length.
-        pieces: both ends of each piece, shape (m, 2, 2), length.
-
-    Returns:
-        The parameters; nan for a line that meets no piece within 0 <= s <= 1.
+    A line that meets no piece within 0 <= s <= 1 has nan.
     """
     a, edge = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
     from_start = a - start[:, None]

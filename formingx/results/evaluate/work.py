@@ -53,11 +53,7 @@ class _SupportReaction(NamedTuple):
 
 
 class EnergyBalance:
-    """Energy balance of the states of one problem, for the whole part also if a half or a quarter is modelled.
-
-    Args:
-        segment: the `Segment` with the problem and its states.
-    """
+    """Energy balance of the states of one problem, for the whole part also if a half or a quarter is modelled."""
 
     def __init__(self, segment: Any):
         self._states, self._curve, self._problem = segment.states, segment.curve, segment.problem
@@ -72,12 +68,10 @@ class EnergyBalance:
         self._ends: dict[int, tuple[Any, dict[str, _SupportReaction]]] = {}
 
     def rows(self) -> dict[str, np.ndarray]:
-        """Return the energies that are added between successive states; collective.
+        """Return {entry: energy added from the previous state, shape (states,)}, stress length^3; collective.
 
-        Returns:
-            {entry: energy added from the previous state to each state, shape (states,)}, stress length^3; in plane
-            strain stress length^2. Entries of loads, supports and tools are their work on the body. "friction", "jumps"
-            and "bonds" are positive losses. "heat" and "change" are energies added by changes of temperature and stage.
+        Loads, supports and tools have their work on the body. "friction", "jumps" and "bonds" are positive losses,
+        "heat" and "change" energies by temperature and stage.
         """
         pairs = list(zip(self._states, self._states[1:]))
         found = [self._step_energies(a, b) for a, b in pairs]
@@ -91,17 +85,10 @@ class EnergyBalance:
 
     def _refined(self, a: Any, b: Any, estimate: dict[str, float], small: float,
                 times: int = _MAX_HALVINGS) -> dict[str, float]:
-        """Return the energies of a step, computed with further states between its ends; collective.
+        """Return {entry: energy added} of a step from a to b, with further states between; collective.
 
-        Args:
-            a: state at the start of the step.
-            b: state at its end.
-            estimate: {entry: energy added in the step}, computed without further states.
-            small: largest change of the energy gained by the body due to a halving after which no other follows.
-            times: largest number of halvings.
-
-        Returns:
-            {entry: energy added in the step}; `estimate` if no state is found between the ends.
+        Halving ends below the change `small` of energy, or after `times`; without a state in between `estimate`
+        remains.
         """
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
@@ -186,10 +173,7 @@ class EnergyBalance:
     def _load_work(self, a: Any, x: Polynomial, control: Polynomial) -> dict[str, float]:
         """Return {load: work in a step}, and as "change" the work of fading forces that a new stage left unbalanced.
 
-        Args:
-            a: state at the start of the step.
-            x: unknowns in the step, polynomial from 0 to 1.
-            control: control in the step, polynomial from 0 to 1.
+        Unknowns and control are polynomials from 0 to 1 in the step.
         """
         problem = self._problem
         names = [name for name, _ in self._loads]
@@ -245,14 +229,9 @@ class EnergyBalance:
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the numbers of the locally owned displacement unknowns at the n nodes of a contact face, shape (n, 2).
+        """Return the owned displacement unknowns at the n nodes of a contact face, shape (n, 2).
 
-        If several contacts share the face, only the nodes that touch the tool of this contact are returned.
-
-        Args:
-            contact: the `FaceContact`.
-            fields: all unknowns, locally owned entries.
-            control: load parameter (control), dimensionless.
+        If several contacts share the face, only nodes that touch this tool are returned.
         """
         problem, dofs = self._problem, contact.rule.dofs
         if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
@@ -314,22 +293,12 @@ class EnergyBalance:
 
 
 def _gains(row: dict[str, float]) -> list[float]:
-    """Return the energies of a step in the order of `row`, as gains of the body: losses change their sign.
-
-    Args:
-        row: {entry: work on the body or other energy added in the step, or loss, positive}.
-    """
+    """Return the energies of a step in the order of `row`, as gains of the body: losses change their sign."""
     return [-value if name in _LOSSES else value for name, value in row.items()]
 
 
 def _imbalance(row: dict[str, float], a: Any, b: Any) -> float:
-    """Return the unbalanced energy of a step: the gains minus the changes of stored and dissipated energy.
-
-    Args:
-        row: {entry: work on the body or other energy added in the step, or loss, positive}.
-        a: state at the start of the step.
-        b: state at its end.
-    """
+    """Return the gains in a step from a to b minus the changes of stored and dissipated energy."""
     names = "strain_energy", *_MATERIAL_LOSSES
     return sum(_gains(row)) - sum(b.measures.get(name, 0.0) - a.measures.get(name, 0.0) for name in names)
 
@@ -340,18 +309,9 @@ def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
 
 
 def _slip_of(law: Any, x: np.ndarray, history: Any, end: np.ndarray) -> np.ndarray:
-    """Return the elastic slip of n contact points at the start of a step, plus their slip in the step.
+    """Return the elastic slip of n contact points at the start of a step, plus the slip in it, (n,), length.
 
-    The points move along straight lines. Only the part of the motion in which a point touches the tool counts.
-
-    Args:
-        law: the contact law.
-        x: positions relative to the tool at the start of the step, shape (n, 2), length.
-        history: `ContactHistory` of the points at the start of the step.
-        end: positions relative to the tool at the end of the step, shape (n, 2), length.
-
-    Returns:
-        Slip along the tangent of the tool, shape (n,), length.
+    Points move from x to `end`, (n, 2), relative to the tool, on straight lines; only the part in contact counts.
     """
     nearest, outer_edge = law.nearest(end), -law.theta
     touched, touches = history.distance > outer_edge, nearest.distance > outer_edge
@@ -377,20 +337,7 @@ def _entry_name(scene: Any, item: Any) -> str:
 
 
 def work(path: Any) -> dict[str, np.ndarray]:
-    """Return the energy balance of a run, and log a warning if more than 0.5 % is unbalanced; collective.
-
-    The warning is added to the findings of the path.
-
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        {load, tool, support, "strain_energy", kind of loss or "unbalanced": energy up to each state, shape (states,)},
-        stress length^3; in plane strain stress length^2.
-
-    Raises:
-        InputError: the material is of K-BKZ type, whose stored energy is no function of its state.
-    """
+    """Return the energy balance of a run, and log a warning if more than 0.5 % is unbalanced; collective. """
     found = balance(path)
     new = [finding for finding in findings(found) if finding not in path.record.findings]
     log_findings(new, path.problem.comm.rank)
@@ -399,11 +346,7 @@ def work(path: Any) -> dict[str, np.ndarray]:
 
 
 def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
-    """Return a warning in a list if "unbalanced" exceeds 0.5 % of the largest entry of an energy balance; else [].
-
-    Args:
-        balanced: {entry: energy up to each state, shape (states,)}, from `balance`.
-    """
+    """Return a warning in a list if "unbalanced" exceeds 0.5 % of the largest entry of a balance; else []."""
     size = max(float(np.abs(values).max()) for values in balanced.values())
     unbalanced = np.abs(balanced["unbalanced"])
     k = int(np.argmax(unbalanced))
@@ -416,17 +359,10 @@ def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
 
 
 def balance(path: Any) -> dict[str, np.ndarray]:
-    """Return the energy balance of a run, without a check of its unbalanced energy; collective.
+    """Return {load, tool, support, "strain_energy", loss or "unbalanced": energy up to each state}; collective.
 
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        {load, tool, support, "strain_energy", kind of loss or "unbalanced": energy up to each state, shape (states,)},
-        stress length^3; in plane strain stress length^2.
-
-    Raises:
-        InputError: the material is of K-BKZ type, whose stored energy is no function of its state.
+    Energies have shape (states,), stress length^3, in plane strain length^2. K-BKZ materials, whose energy is no
+    function of the state, raise an InputError.
     """
     if "strain_energy" not in path.columns:
         raise InputError("Path.work: is not available with K-BKZ: its stored energy is no function of its state")

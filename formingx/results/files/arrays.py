@@ -10,12 +10,7 @@ _KEY, _TYPES = "array", ("<f8", "<i8", "|b1")
 def pack(data: Any) -> tuple[Any, bytes]:
     """Split data into JSON data and the bytes of its arrays; `unpack` is the inverse.
 
-    Args:
-        data: numbers, strings, lists, dictionaries and arrays, nested in any way.
-
-    Returns:
-        The data with {"array": [position of its first byte, type, shape]} in place of each array, and the little-endian
-        bytes of all arrays in order.
+    An array becomes {"array": [position of its first byte, type, shape]}; the bytes are little-endian and in order.
     """
     found: list[bytes] = []
     end = 0
@@ -38,12 +33,7 @@ def pack(data: Any) -> tuple[Any, bytes]:
 def unpack(data: Any, content: bytes) -> Any:
     """Return the data that `pack` split; its arrays are read-only.
 
-    Args:
-        data: JSON data from `pack`.
-        content: bytes of all arrays from `pack`.
-
-    Raises:
-        ValueError: an array has an unknown type, or lies outside `content`.
+    An array of unknown type, or outside `content`, raises a ValueError.
     """
     if isinstance(data, list):
         return [unpack(value, content) for value in data]

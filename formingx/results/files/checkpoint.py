@@ -56,18 +56,13 @@ from .progress import progress
 
 
 class Checkpoint:
-    """Writer of the checkpoint folder of one run. Creating it is collective.
+    """Writer of the checkpoint folder of one run.
 
-    Args:
-        folder: name of the folder; it is created if it does not exist, otherwise its states are compared with the path.
-        path: the `Path` of the run. Its first states must be the states in the folder.
+    Creating it is collective. A folder of another run, or with other files, is an InputError; one that cannot be
+    written an OSError.
 
     Attributes:
         folder: the folder (`pathlib.Path`).
-
-    Raises:
-        InputError: the folder holds another run, or other files.
-        OSError: the folder cannot be written.
     """
 
     def __init__(self, folder: Any, path: Any):
@@ -77,8 +72,7 @@ class Checkpoint:
     def write(self) -> None:
         """Write the states of the path that the folder does not contain yet; collective.
 
-        Raises:
-            OSError: a state cannot be written, or the disk is full. All earlier states are kept.
+        An OSError, as of a full disk, keeps all earlier states.
         """
         path, first = self._path, self._n_written
         with progress(self._comm, f"{self.folder}: {len(path) - first} states") as done:
@@ -88,31 +82,17 @@ class Checkpoint:
                 done((self._n_written - first) / (len(path) - first))
 
     def end(self, failure: str, findings: Sequence[Finding]) -> None:
-        """Write the file end.json at the end of the run: its error message and its findings; collective.
-
-        Args:
-            failure: message of the error that ended the run, or "".
-            findings: the findings on the run (`Path.findings`).
-
-        Raises:
-            OSError: the file cannot be written.
-        """
+        """Write end.json with the error message, or "", and the findings of a run; collective. Raises OSError."""
         about = {"failure": failure, "findings": findings}
         files.on_root(self._comm, lambda: named_os_errors(
             lambda: files.replace(self.folder / END, lambda stream: json.dump(about, stream, indent=1)),
             self.folder, f"{END} could not be written; its states are kept"))
 
     def _begin(self) -> int:
-        """Create the folder, or check that its states belong to this run; collective.
+        """Create the folder, or check that its states belong to this run, and return their number; collective.
 
-        States of an unfinished last step are removed from the folder.
-
-        Returns:
-            The number of states that remain in the folder.
-
-        Raises:
-            InputError: the folder holds another run, or other files.
-            OSError: the folder cannot be written.
+        States of an unfinished last step are removed. Another run or other files are an InputError, failed writing an
+        OSError.
         """
         problem, folder, path = self._path.segments[0].problem, self.folder, self._path
         scene = describe(problem)
@@ -143,12 +123,7 @@ class Checkpoint:
     def _write_state(self, number: int, state: State) -> None:
         """Write a state of the path; collective.
 
-        Args:
-            number: number of the state in the path.
-            state: the state.
-
-        Raises:
-            OSError: the state cannot be written, or the folder contains it already.
+        A state that exists or cannot be written raises an OSError.
         """
         segment = self._path.segment(state)
         problem = segment.problem
@@ -192,19 +167,10 @@ class Checkpoint:
 
 
 def read(folder: Any, scene: Scene, state: int | None = None, resumes: bool = False) -> Record:
-    """Return the solver's record of the run in a checkpoint (`formingx.load`); collective.
+    """Return the solver's record of the run in a checkpoint up to a state (`formingx.load`); collective.
 
-    Args:
-        folder: folder of the checkpoint.
-        scene: the scene of the run.
-        state: number of the last state to read, from 0; default the last state of the last completed step.
-        resumes: True to refuse a scene with an object that cannot be compared with that of the checkpoint.
-
-    Returns:
-        The record with all states up to that one. Its problem has the unknowns of the last state.
-
-    Raises:
-        InputError: there is no checkpoint, it is damaged, it belongs to another scene, or it has no such state.
+    Default is the last state of the last completed step. A damaged checkpoint, another scene or state is an InputError,
+    with `resumes` also an object that cannot be compared.
     """
     folder = file_path("load: folder", folder)
     problem = Problem(check_type("load: scene", scene, Scene, "a formingx.Scene"))
@@ -242,26 +208,12 @@ _mesh_loaders: list[Callable[[Problem, State, dict[str, Any]], Problem]] = []
 
 
 def register_mesh_loader(loader: Callable[[Problem, State, dict[str, Any]], Problem]) -> None:
-    """Register the function that restores the problem on a new mesh of a remeshed run; it replaces an earlier one.
-
-    Args:
-        loader: function of (problem on the old mesh, last state on it, data of the new mesh from the checkpoint) that
-            returns the problem on the new mesh.
-    """
+    """Register the loader of a new mesh, (problem, last state, data) to problem, of a remeshed run."""
     _mesh_loaders[:] = [loader]
 
 
 def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Problem:
-    """Return the problem on the next mesh of a remeshed run.
-
-    Args:
-        problem: the problem on the old mesh.
-        last: last state on the old mesh.
-        data: the new mesh and the data transferred to it, from the checkpoint.
-
-    Raises:
-        InputError: the extension `remeshing` is not installed.
-    """
+    """Return the problem on the next mesh of a remeshed run; InputError without the extension `remeshing`."""
     if not _mesh_loaders:
         raise InputError("load: the checkpoint is of a remeshed run: the extension 'remeshing' of formingx is not"
                          " installed")
@@ -269,26 +221,13 @@ def _on_next_mesh(problem: Problem, last: State, data: dict[str, Any]) -> Proble
 
 
 def holds_states(folder: Any, comm: Any) -> bool:
-    """Return True if a folder is a checkpoint with at least one state; collective.
-
-    Args:
-        folder: name of the folder.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: a state is missing in the checkpoint.
-    """
+    """Return True if a folder is a checkpoint with a state; InputError if states are missing; collective."""
     folder = file_path("checkpoint", folder)
     return files.on_root(comm, lambda: (folder / "scene.json").exists() and bool(complete_states(folder)))
 
 
 def _read_state(data: dict, problem: Any) -> State:
-    """Return the `State` from the data of a state in a checkpoint; collective.
-
-    Args:
-        data: data of the state, with its arrays.
-        problem: the `Problem` on the mesh of the state.
-    """
+    """Return the `State` of a problem from its data in a checkpoint, with arrays; collective."""
     data, space = dict(data), problem.forms.space
     last = problem.comm.rank == problem.comm.size - 1
     arrays = {name: np.concatenate([_of_cells(space, data[name]), data[f"{name}_tail"] if last else []])
@@ -301,14 +240,9 @@ def _read_state(data: dict, problem: Any) -> State:
 
 
 def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
-    """Return the unknowns of each cell on rank 0, in the order in which the script gave the cells; collective.
+    """Return the unknowns of each cell on rank 0 in the order of the script, from owned ones; collective.
 
-    Args:
-        space: function space of the unknowns.
-        owned: unknowns that this rank owns.
-
-    Returns:
-        Shape (cells, unknowns per cell); empty on other ranks.
+    The shape is (cells, unknowns per cell), and empty on other ranks.
     """
     topology, w = space.mesh.topology, fem.Function(space)
     cells, n = topology.index_map(topology.dim).size_local, space.dofmap.index_map.size_local
@@ -320,13 +254,7 @@ def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
 
 
 def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
-    """Return the n unknowns that this rank owns, shape (n,), from the unknowns of each cell.
-
-    Args:
-        space: function space of the unknowns.
-        values: unknowns of all cells, shape (cells, unknowns per cell). They have the order in which the script gave
-            the cells to DOLFINx, which does not depend on the number of ranks.
-    """
+    """Return the n owned unknowns, shape (n,), from those of all cells, (cells, unknowns per cell). """
     numbers = space.mesh.topology.original_cell_index
     found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
     found[space.dofmap.list] = values[numbers[:len(space.dofmap.list)]]
@@ -334,12 +262,7 @@ def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
 
 
 def _tail(space: Any, owned: np.ndarray) -> list[float]:
-    """Return the unknowns that belong to no cell, such as Lagrange multipliers, on all ranks; collective.
-
-    Args:
-        space: function space of the unknowns that belong to cells.
-        owned: entries that this rank owns: its unknowns of `space`, then on the last rank the others.
-    """
+    """Return the owned unknowns that belong to no cell, as Lagrange multipliers, on all ranks; collective."""
     return space.mesh.comm.allgather(owned[space.dofmap.index_map.size_local:].tolist())[-1]
 
 
@@ -352,16 +275,7 @@ def _plain_state(state: State) -> dict[str, Any]:
 
 
 def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> list[Any]:
-    """Return the history variables of a state from its data in a checkpoint.
-
-    Args:
-        problem: the `Problem` on the mesh of the state.
-        variables: for each set of history variables (of a material, a contact or the temperature) the dictionary of
-            its arrays.
-
-    Raises:
-        InputError: the scene has another number of sets of history variables.
-    """
+    """Return the history variables of a state from the dictionaries of its arrays, one per set; or an InputError."""
     if len(variables) != len(problem.histories):
         raise InputError("checkpoint: its states have other histories (friction, relaxation, heat) than this scene: it"
                          " belongs to another scene")

@@ -28,14 +28,7 @@ PILOT = "pilot"
 
 
 def begun(folder: Any) -> bool:
-    """Return True if a checkpoint holds a state; False if its folder is missing, empty, or holds no complete state yet.
-
-    Args:
-        folder: folder of the checkpoint.
-
-    Raises:
-        InputError: the folder holds other files.
-    """
+    """Return True if a checkpoint holds a complete state; a folder of other files is an InputError. """
     folder = file_path("checkpoint", folder)
     if not folder.exists() or folder.is_dir() and all(entry.suffix == ".part" for entry in folder.iterdir()):
         return False
@@ -44,18 +37,9 @@ def begun(folder: Any) -> bool:
 
 
 def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
-    """Return the data of the last states of a checkpoint, to which a run may still be writing.
+    """Return count of states, attributes of the last `count` states, and seconds since the last was written.
 
-    Args:
-        folder: folder of the checkpoint.
-        count: number of states to read.
-
-    Returns:
-        Number of states in the checkpoint; for each of the last `count` states its attributes as {name: value}; time
-        since the last one was written, s.
-
-    Raises:
-        InputError: there is no checkpoint, it holds no state, or it is damaged.
+    A run may still be writing. A missing, empty or damaged checkpoint is an InputError.
     """
     folder = file_path("checkpoint", folder)
     _check_format(folder, read_json(folder / "scene.json"))
@@ -67,17 +51,9 @@ def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
 
 
 def ended(folder: Any) -> dict[str, Any] | None:
-    """Return the error message and the findings at the end of a run from its checkpoint.
+    """Return {"failure": message or "", "findings": [Finding]} at the end of a run; None if it has not ended.
 
-    Args:
-        folder: folder of the checkpoint.
-
-    Returns:
-        {"failure": error message or "", "findings": [Finding]}. None if the run has not ended, or if the file is
-        missing as in older checkpoints.
-
-    Raises:
-        InputError: the file is damaged.
+    Older checkpoints without the file give None, too; a damaged file is an InputError.
     """
     file = file_path("checkpoint", folder) / END
     if not file.exists():
@@ -91,17 +67,9 @@ def ended(folder: Any) -> dict[str, Any] | None:
 
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return all data of a checkpoint, for a report without the scene.
+    """Return scene.json, with "ended" from `ended`, and the attributes of each state, for a report without the scene.
 
-    Args:
-        folder: folder of the checkpoint.
-
-    Returns:
-        First the data of scene.json, such as the description of the scene and versions of programs; the entry "ended"
-        has the error message and the findings of the run, or None. Then for each state its attributes as {name: value}.
-
-    Raises:
-        InputError: there is no checkpoint, it holds no state, or it is damaged.
+    A missing, empty or damaged checkpoint is an InputError.
     """
     folder = file_path("checkpoint", folder)
     about = read_json(folder / "scene.json")
@@ -113,16 +81,7 @@ def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
 
 
 def read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
-    """Return the data of the first states of a checkpoint; not collective.
-
-    Args:
-        folder: folder of the checkpoint.
-        count: number of states.
-        comm: MPI communicator; on its rank 0 a progress bar is shown.
-
-    Returns:
-        For each state its attributes as {name: value}.
-    """
+    """Return the data of the first `count` states, {name: value} each, with a progress bar; not collective."""
     found = []
     with progress(comm, f"{folder}: {count} states") as done:
         for k in range(count):
@@ -132,31 +91,14 @@ def read_states(folder: FilePath, count: int, comm: Any) -> list[dict]:
 
 
 def _check_format(folder: FilePath, about: dict) -> None:
-    """Check the format of a checkpoint.
-
-    Args:
-        folder: folder of the checkpoint, for the message.
-        about: data of its file scene.json.
-
-    Raises:
-        InputError: this version cannot read the format.
-    """
+    """Raise an InputError if this version cannot read the format of a checkpoint."""
     if about.get("formingx") != FORMAT:
         raise InputError(f"checkpoint {str(folder)!r} has the format {about.get('formingx')!r}; this version of"
                          f" formingx reads {FORMAT}")
 
 
 def check_scene(folder: FilePath, about: dict, scene: dict) -> None:
-    """Check that a checkpoint belongs to a scene.
-
-    Args:
-        folder: folder of the checkpoint.
-        about: data of its file scene.json.
-        scene: description of the scene with which it is compared (`description.describe`).
-
-    Raises:
-        InputError: its format is unknown, it is damaged, or it belongs to another scene.
-    """
+    """Raise an InputError unless a checkpoint has a known format and the description `scene`, undamaged."""
     _check_format(folder, about)
     if not isinstance(about.get("scene"), dict):
         raise InputError(f"checkpoint {str(folder)!r} is damaged: scene.json has no description of the scene")
@@ -191,8 +133,7 @@ def state_name(number: int) -> str:
 def complete_states(folder: FilePath) -> list[FilePath]:
     """Return the folders of the complete states of a checkpoint, in order.
 
-    Raises:
-        InputError: a state is missing.
+    A missing state is an InputError.
     """
     names = (entry for entry in folder.iterdir() if entry.name.isascii() and entry.name.isdigit())
     found = sorted(names, key=lambda entry: int(entry.name))
@@ -205,16 +146,8 @@ def complete_states(folder: FilePath) -> list[FilePath]:
 def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     """Return the data of a state of a checkpoint as {name: value}, with its arrays.
 
-    They are the attributes of the `State`, the history variables as "memory", the "profile" of a sheet, the "number" of
-    the state, and its "checksums".
-
-    Args:
-        folder: folder of the checkpoint.
-        number: number of the state.
-        checksums: False to skip the check of the checksums.
-
-    Raises:
-        InputError: a file is missing, or differs from the one that was written.
+    They are the attributes of the `State`, history variables as "memory", "profile", "number" and "checksums". A
+    missing or changed file is an InputError.
     """
     state_folder = folder / state_name(number)
     data = read_json(state_folder / "state.json")
@@ -233,11 +166,7 @@ def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
 
 
 def read_json(file: FilePath) -> Any:
-    """Return a dictionary from a JSON file of a checkpoint.
-
-    Raises:
-        InputError: the file is missing, damaged, or holds no dictionary.
-    """
+    """Return a dictionary from a JSON file of a checkpoint; otherwise an InputError."""
     try:
         with open(file, encoding="utf-8") as stream:
             found = json.load(stream)
@@ -270,30 +199,13 @@ def _instead(file: FilePath) -> str:
 
 
 def crc_sums(data: dict, content: bytes) -> dict[str, int]:
-    """Return {name of the file: CRC-32 checksum} of the two files of a state in a checkpoint.
-
-    Args:
-        data: data of the file state.json.
-        content: bytes of the file with the arrays.
-    """
+    """Return {file: CRC-32 checksum} of state.json and the arrays of a state in a checkpoint."""
     summed = {key: value for key, value in data.items() if key != "checksums"}
     return {"state.json": zlib.crc32(json.dumps(summed, sort_keys=True).encode()), ARRAYS: zlib.crc32(content)}
 
 
 def named_os_errors(action: Callable[[], Any], folder: FilePath, what: str) -> Any:
-    """Call a function; if it raises an OSError, add the checkpoint and the failed task to the message.
-
-    Args:
-        action: function without arguments.
-        folder: folder of the checkpoint, for the message.
-        what: the failed task, such as "state 3 could not be written".
-
-    Returns:
-        The result of the function.
-
-    Raises:
-        OSError: the error of the action, with the folder and the task in its message.
-    """
+    """Call a function; an OSError of it gets the folder and the failed task `what` into its message."""
     try:
         return action()
     except OSError as error:

@@ -22,25 +22,12 @@ _MAY_CHANGE = ("until", "intermediate", "duration", "tables")
 
 
 def describe_stages(plans: Sequence[Any]) -> list[dict[str, Any]]:
-    """Return the stages of a process as JSON data.
-
-    Args:
-        plans: the plans of the stages.
-    """
+    """Return the stages of a process as JSON data."""
     return json.loads(json.dumps([_describe(plan) for plan in plans]))
 
 
 def write_stages(folder: FilePath, plans: Sequence[Any], comm: Any) -> None:
-    """Write the stages of a process into the folder of its checkpoint; collective.
-
-    Args:
-        folder: folder of the checkpoint.
-        plans: the plans of the stages.
-        comm: MPI communicator.
-
-    Raises:
-        OSError: the file cannot be written.
-    """
+    """Write the stages of a process into the folder of its checkpoint; collective. Raises OSError."""
     about = {"stages": describe_stages(plans)}
     files.on_root(comm, lambda: named_os_errors(
         lambda: files.replace(folder / STAGES, lambda stream: json.dump(about, stream, indent=1)),
@@ -50,17 +37,8 @@ def write_stages(folder: FilePath, plans: Sequence[Any], comm: Any) -> None:
 def check_stages(folder: FilePath, plans: Sequence[Any], number: int, now: float, comm: Any) -> None:
     """Check that a process has the stages by which the states of a checkpoint were made; collective.
 
-    The last of them may continue to another end.
-
-    Args:
-        folder: folder of the checkpoint.
-        plans: the plans of the stages.
-        number: number of the stage of the last state.
-        now: process time of the last state.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: a stage differs, and the message names the first difference; or the stages are not known.
+    Stage `number`, at process time `now`, may continue to another end. Unknown stages, or the first difference, are an
+    InputError.
     """
     def check():
         if not (folder / STAGES).exists():
@@ -81,13 +59,7 @@ def check_stages(folder: FilePath, plans: Sequence[Any], number: int, now: float
 
 
 def _difference(there: dict[str, Any], here: dict[str, Any], now: float | None) -> str:
-    """Return the first difference of two stages as text, or "" if there is none.
-
-    Args:
-        there: the stage of the checkpoint.
-        here: the stage of the process that resumes.
-        now: process time up to which the stage has run; None if it has ended.
-    """
+    """Return the first difference of two stages as text, or ""; `now` is the time run so far, None at its end."""
     found = [f"{where} = {a!r} there, {b!r} here" for where, a, b in differences(there, here)
              if now is None or where.split("[")[0] not in _MAY_CHANGE]
     if not found and now is not None and not _same_until(there["tables"], here["tables"], now):
@@ -112,13 +84,7 @@ def _describe(plan: Any) -> dict[str, Any]:
 
 
 def _same_until(there: list[Any], here: list[Any], now: float) -> bool:
-    """Return True if tables of amplitudes agree up to a process time.
-
-    Args:
-        there: [[number of the item, knots (time, value)]].
-        here: the other tables in the same form.
-        now: the process time.
-    """
+    """Return True if tables [[item, knots (time, value)]] of amplitudes agree up to the process time `now`."""
     if [number for number, _ in there] != [number for number, _ in here]:
         return False
     for (_, a), (_, b) in zip(there, here):

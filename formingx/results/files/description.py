@@ -19,14 +19,10 @@ _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "
 
 
 def describe(problem: Any) -> dict[str, Any]:
-    """Return the description of the scene of a problem as JSON data; collective.
+    """Return the description of the scene as JSON data, the same on any number of ranks; collective.
 
-    The entry "mesh" holds counts, and sums over the cells that change with any coordinate, tag or order of the cells.
-    "unknowns" is the number of unknowns. The other entries hold the public attributes of materials, supports, loads,
-    contacts, model and kinematics. The description is the same on any number of ranks.
-
-    Args:
-        problem: the `Problem`.
+    "mesh" holds counts and sums that change with any coordinate, tag or order of cells; the other entries are public
+    attributes of materials, supports, loads, contacts, model and kinematics.
     """
     scene = problem.scene
     known = set(_PARTS) | {"mesh", "temperature", "state_transfer"}
@@ -48,15 +44,10 @@ def describe(problem: Any) -> dict[str, Any]:
 
 
 def plain(value: Any, depth: int = 8) -> Any:
-    """Return an object as JSON data: numbers, strings, lists and dictionaries.
+    """Return an object as JSON data: numbers, strings, lists and dictionaries of at most `depth` levels.
 
-    An object becomes {"kind": name of its class, name of a public attribute: its value}, with the code of a class of
-    the user. A function is described by what it computes (`functions.described`). Objects that are nested too deeply
-    become text.
-
-    Args:
-        value: any object.
-        depth: largest number of nested levels.
+    An object becomes {"kind": its class, public attribute: value}, with the code of a user's class; functions are
+    described by what they compute.
     """
     if value is None or isinstance(value, bool | int | float | str):
         return value
@@ -81,12 +72,7 @@ def plain(value: Any, depth: int = 8) -> Any:
 
 
 def incomparable(about: Any, where: str = "") -> Iterator[tuple[str, str]]:
-    """Yield the objects in a description that cannot be compared, as (place, text of the object).
-
-    Args:
-        about: JSON data (`describe`).
-        where: place of the data in the whole description.
-    """
+    """Yield the objects in a description that cannot be compared, as (place, text of the object)."""
     if isinstance(about, dict):
         if UNKNOWN in about:
             yield where, about[UNKNOWN]
@@ -100,12 +86,7 @@ def incomparable(about: Any, where: str = "") -> Iterator[tuple[str, str]]:
 def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Yield the differences between two values of JSON data as (place, value in a, value in b).
 
-    A value that exists in one of them only is None in the other. Floats that agree to nine digits are equal.
-
-    Args:
-        a: JSON data.
-        b: JSON data.
-        where: place of the two values in the whole data, such as "loads[0].on"; "" for the whole data.
+    A value in one only is None in the other; floats that agree to nine digits are equal. `where` is the place of both.
     """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in dict.fromkeys([*a, *b]):
@@ -121,18 +102,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
-    """Return weighted sums of fields over the quadrature points of a layer; collective.
-
-    The weights differ from point to point, so a change at any point changes the sum.
-
-    Args:
-        scene: the scene.
-        layer: name of the layer.
-        fields: {name of a field: function that returns its values at the points of a `Sample`, points with cells}.
-
-    Returns:
-        {name of a field: sum}.
-    """
+    """Return {field: sum} over the quadrature points of a layer, with weights that differ by point; collective. """
     sample = scene.sample(layer)
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[sample.cells])
     weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(sample.places)))).ravel()

@@ -45,9 +45,6 @@ class Fields:
 
     Each cell has six nodes of its own: its corners, and the middles of its edges. A membrane in a section has three.
 
-    Args:
-        path: the computed `Path`, with the states of one mesh.
-
     Attributes:
         points: reference positions of the nodes of each cell, shape (cells, nodes, components), length.
         dimension: dimension of the elements: 1 for an axisymmetric membrane, else 2.
@@ -70,14 +67,7 @@ class Fields:
         self._faces: dict[int, tuple[ContactFace, np.ndarray, np.ndarray]] = {}
 
     def evaluate(self, state: Any) -> dict[str, np.ndarray]:
-        """Return the fields of a state, such as "displacement", "cauchy_rr" and "contact_pressure"; collective.
-
-        Args:
-            state: a state on the mesh of the path.
-
-        Returns:
-            {name of the field: values at the nodes of each cell, shape (cells, nodes, components)}.
-        """
+        """Return {field: values at the nodes of each cell, (cells, nodes, components)} of a state; collective."""
         problem, shape = self._problem, self.points.shape[:2]
         with problem.state_context(state):
             found = {"displacement": self._eval(self._u)}
@@ -134,18 +124,10 @@ class Fields:
 
 
 def to_vtk(path: Any, file: Any, states: Any = None) -> None:
-    """Write fields of states as VTU files, and a PVD file that lists them (`Path.to_vtk`); rank 0 writes.
+    """Write fields of states as VTU files, NAME-3.vtu for state 3, and a PVD file (`Path.to_vtk`).
 
-    The state with the number 3 is written to NAME-3.vtu, beside NAME.pvd.
-
-    Args:
-        path: the computed `Path`.
-        file: name of the PVD file; it ends in .pvd.
-        states: a state, a sequence of states, or "all"; default the last state of the path.
-
-    Raises:
-        InputError: the name has another ending, or `states` has an entry that is not a `State`.
-        OSError: a file cannot be written.
+    States are a state, a sequence, or "all"; default the last. Another ending or type is an InputError, a failed file
+    an OSError.
     """
     file, comm = files.named("to_vtk", file, ".pvd"), path.problem.comm
     meshes: dict[int, tuple[Fields, Any]] = {}              # fields, and points of all ranks
@@ -170,12 +152,7 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
 
 
 def _as_vtu(points: np.ndarray, values: dict[str, np.ndarray]) -> str:
-    """Return the content of a VTU file, as text.
-
-    Args:
-        points: reference positions of the nodes of each cell, shape (cells, nodes, components), length.
-        values: {name of a field: values at the nodes, shape (cells, nodes, components)}.
-    """
+    """Return the text of a VTU file of points and named values, both (cells, nodes, components)."""
     pyvista = figures.pyvista()
     from vtkmodules.vtkIOXML import vtkXMLUnstructuredGridWriter
     cells, nodes = points.shape[:2]
@@ -198,20 +175,10 @@ def _three(array: np.ndarray) -> np.ndarray:
 
 
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
-    """Return the states to be written, with their numbers in the files.
+    """Return (number, state) of the states to be written: one, a sequence, "all", or None for the last.
 
-    A state of the path has its number in the path. A state solved for by `Path.state_at` has its position in `states`.
-    If these numbers do not increase, the states are numbered from 0.
-
-    Args:
-        path: the computed `Path`.
-        states: a state, a sequence of states, or "all"; None: the last state of the path.
-
-    Returns:
-        Pairs (number, state).
-
-    Raises:
-        InputError: `states` has an entry that is not a `State`, or none.
+    The number is that in the path, for one from `Path.state_at` its position; if they do not increase, they count from
+    0. A wrong entry is an InputError.
     """
     if isinstance(states, str):
         if states != "all":
@@ -234,18 +201,9 @@ def _gather(values: np.ndarray, comm: Any) -> Any:
 
 
 def _position_across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return between which lines across a sheet m points lie.
+    """Return k, (m,), of the line before each point on a sheet, and its position from line k (0) to k + 1 (1).
 
-    Each of the n lines goes from a bottom point to the opposite top point. The lines are in order along the sheet.
-
-    Args:
-        points: the points, reference positions, shape (m, 2), length.
-        bottom: bottom points, shape (n, 2), length.
-        top: top points opposite them, shape (n, 2), length.
-
-    Returns:
-        For each point a number k, shape (m,): it lies between the lines k and k + 1. Its position between them, 0 on
-        the line k, 1 on the line k + 1, shape (m,).
+    Lines go from bottom points to opposite top points, (n, 2) each, in order; points have shape (m, 2), length.
     """
     k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
     across = top - bottom

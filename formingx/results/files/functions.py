@@ -35,15 +35,9 @@ _LIBRARIES = tuple(os.path.abspath(folder) + os.sep for folder in (
 
 
 def described(value: Any, depth: int = 8, known: tuple[int, ...] = ()) -> Any:
-    """Return a value that a function uses as JSON data.
+    """Return a value that a function uses as JSON data, or {`UNKNOWN`: text} if it cannot be known.
 
-    Args:
-        value: any object.
-        depth: largest number of nested levels.
-        known: identities of the functions that are being described, which may call themselves.
-
-    Returns:
-        Numbers, strings, lists and dictionaries; {`UNKNOWN`: text} for an object whose contents are not known.
+    `known` has identities of the functions that are being described, which may call themselves.
     """
     if value is None or isinstance(value, bool | int | float | str):
         return value
@@ -83,13 +77,9 @@ def described(value: Any, depth: int = 8, known: tuple[int, ...] = ()) -> Any:
 
 
 def functions_in(value: Any, where: str = "", known: set[int] | None = None) -> Iterator[tuple[str, Any]]:
-    """Yield the functions and tables that an object of formingx holds, such as a material, as (place, description).
+    """Yield the functions and tables that an object of formingx holds, as (place, description).
 
-    Args:
-        value: the object; attributes of objects of formingx, variables of its functions, and entries of lists and
-            dictionaries are searched.
-        where: place of the object in the whole, such as "energy".
-        known: identities of the objects that were searched already.
+    Attributes, variables of functions, and entries of lists and dictionaries are searched, but not the `known` objects.
     """
     known = set() if known is None else known
     if id(value) in known or value is None or isinstance(value, type | str | bool | int | float | np.ndarray):

@@ -8,15 +8,7 @@ from typing import Any
 
 @contextlib.contextmanager
 def progress(comm: Any, words: str) -> Iterator[Callable[[float], None]]:
-    """Show a progress bar on rank 0 while a block runs, if it takes longer than two seconds.
-
-    Args:
-        comm: MPI communicator.
-        words: text before the bar.
-
-    Yields:
-        Function that moves the bar; the block calls it with the finished fraction, 0 to 1.
-    """
+    """Show a progress bar on rank 0 after two seconds; yields the function that sets the fraction, 0 to 1."""
     from tqdm import tqdm
     seen = sys.stderr.isatty() or "ipykernel" in sys.modules             # no bar in a log file
     with tqdm(total=1.0, desc=words, delay=2, disable=comm.rank != 0 or not seen, leave=False,

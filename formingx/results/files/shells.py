@@ -12,19 +12,10 @@ from . import tabular
 
 
 def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return quadratic shell elements on the middle surface of an axisymmetric sheet.
+    """Return nodes, wall and quadratic shell elements of the middle surface of an axisymmetric sheet.
 
-    The deformed section is revolved about the z axis. Nodes lie half-way between opposite points of the two faces.
-    Along the section there is one element for each edge of a face. Elements at the axis are triangles.
-
-    Args:
-        profile: the `Profile` of the sheet.
-        parts: number of elements round the axis.
-
-    Returns:
-        Nodes (x, y, z), shape (n, 3), length. Wall thickness at the nodes, the mean of the shortest distances from
-        either face to the other, shape (n,), length. Node numbers from 0 of the triangles (S6), shape (m, 6), and of
-        the quadrilaterals (S8R), shape (k, 8); corners first, then middles of the edges.
+    `parts` elements lie round the axis. Nodes (n, 3), length; walls (n,), length, means of the shortest distances
+    between the faces; node numbers of triangles S6 (m, 6) and quadrilaterals S8R (k, 8), corners first.
     """
     wall = (distance_to_line(profile.bottom, refined(profile.top))
             + distance_to_line(profile.top, refined(profile.bottom))) / 2
@@ -51,17 +42,8 @@ def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
     """Write an axisymmetric sheet as shell elements for CalculiX or Abaqus (`Path.to_inp`; rank 0 writes).
 
-    The file holds nodes, elements, wall thickness at the nodes, and the set of nodes at the rim; no material.
-
-    Args:
-        profile: the `Profile` of the sheet.
-        parts: number of elements round the axis.
-        file: its name ends in .inp.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: the name has another ending.
-        OSError: the file cannot be written.
+    The file holds nodes, elements, wall thickness, and the set of nodes at the rim. Another ending than .inp is an
+    InputError, a failed file an OSError.
     """
     file = tabular.named("to_inp", file, ".inp")
     points, walls, tips, quads = shells(profile, parts)

@@ -17,19 +17,9 @@ _EDGE_PIECES = 4  # number of straight pieces that replace the curved edge of an
 
 
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
-    """Return the closed surface of a deformed sheet as triangles.
+    """Return points (n, 3), length, and triangles (m, 3), seen from outside, of the surface of a sheet.
 
-    An axisymmetric section is revolved about the z axis. A section in plane strain is extruded along y. The length of
-    the extrusion is the width of the section in r.
-
-    Args:
-        profile: the `Profile` of the section.
-        axisymmetric: False in plane strain.
-        parts: number of strips round the axis; not used in plane strain.
-
-    Returns:
-        Points (x, y, z), shape (n, 3), length. For each triangle the row numbers of its three corners in the points,
-        shape (m, 3), counter-clockwise seen from outside.
+    It is revolved about z in `parts` strips, or in plane strain extruded along y over the width of the section.
     """
     line = _section(profile)[0]
     n = len(line)
@@ -57,14 +47,9 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
 
 
 def _section(profile: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return points on the outline of a section, and the positions of its first half along the sheet.
+    """Return points (2 k, 2) round a section, and the positions of its first half, (k,), along the nodes.
 
-    Args:
-        profile: the `Profile` of the section.
-
-    Returns:
-        Points (r, z), shape (2 k, 2), length: along the lower half of the start, the bottom and the lower half of the
-        end, and back along the upper half. Positions as fractional numbers of the nodes of the profile, shape (k,).
+    It runs along half of the start, the bottom and half of the end, and back along the upper half.
     """
     bottom, top = (refined(face, _EDGE_PIECES) for face in (profile.bottom, profile.top))
     (below, above), (under, over) = (
@@ -77,16 +62,7 @@ def _section(profile: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the closed surface of a deformed sheet, and the wall over original thickness at its points.
-
-    Args:
-        profile: the `Profile` of the section.
-        axisymmetric: False in plane strain.
-
-    Returns:
-        Points, shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3); wall over original
-        thickness at the points, shape (n,).
-    """
+    """Return points (n, 3), triangles (m, 3) of the surface, and wall over original thickness (n,)."""
     points, triangles = solid(profile, axisymmetric)
     ratio = np.interp(_section(profile)[1], np.arange(len(profile.bottom)), profile.wall_ratio)
     ratio = np.concatenate([ratio, ratio[::-1]])
@@ -94,18 +70,7 @@ def coloured(profile: Any, axisymmetric: bool) -> tuple[np.ndarray, np.ndarray, 
 
 
 def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any) -> None:
-    """Write the surface of a part as a binary STL file (rank 0 writes).
-
-    Args:
-        surface: points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3);
-            wall over original thickness at the points, shape (n,), not used.
-        file: its name ends in .stl.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: the name has another ending.
-        OSError: the file cannot be written.
-    """
+    """Write a surface (points, triangles, wall ratio) as .stl; InputError by ending, else OSError."""
     file = tabular.named("to_stl", file, ".stl")
     tabular.on_root(comm, lambda: write_stl(*surface[:2], file))
 
@@ -113,17 +78,8 @@ def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: 
 def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any, units: Units = NONE) -> None:
     """Write the surface of a part as a binary glTF file, coloured by the wall ratio (rank 0 writes).
 
-    Args:
-        surface: points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3);
-            wall over original thickness at the points, shape (n,).
-        file: its name ends in .glb.
-        comm: MPI communicator.
-        units: units of the script, in which the points are given. The file is in metres; without a unit, lengths count
-            as metres.
-
-    Raises:
-        InputError: the name has another ending.
-        OSError: the file cannot be written.
+    It is (points (n, 3), triangles (m, 3), ratios (n,)) in `units`; the file is in metres. Another ending than .glb is
+    an InputError, a failed file an OSError.
     """
     from matplotlib import colormaps
     file = tabular.named("to_gltf", file, ".glb")
@@ -157,11 +113,7 @@ def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm:
 
 
 def _ends(number: np.ndarray) -> list[np.ndarray]:
-    """Return the triangles of the two end faces of an extruded sheet, shape (k, 3) each.
-
-    Args:
-        number: numbers of the points at both ends, shape (2, n), in order along the bottom and back along the top.
-    """
+    """Return the triangles of both ends, (k, 3) each, with numbers (2, n) along bottom and back on top."""
     found = []
     for row, sense in ((number[0], 1), (number[1], -1)):
         half = len(row) // 2

@@ -95,11 +95,7 @@ class Status:
 def of_folder(folder: Any) -> Status:
     """Return the status of a run from its checkpoint.
 
-    Args:
-        folder: folder of the checkpoint.
-
-    Raises:
-        InputError: there is no checkpoint, it holds no state, or it is damaged.
+    A missing, empty or damaged checkpoint is an InputError.
     """
     n, states, age = checkpoint_data.latest(folder, _RECENT_STEPS)
     last, ended = states[-1], checkpoint_data.ended(folder)
@@ -124,18 +120,10 @@ def of_folder(folder: Any) -> Status:
 
 
 def target_column(stepping: dict[str, Any], measures: Collection[str]) -> tuple[str, float] | None:
-    """Return the target of a run or stage, as a column and its value.
+    """Return (column, value) of the target of a run or stage from its `State.stepping`; None without a target.
 
-    A target such as `pressure(0.2)` of one of several loads becomes the column of this load, such as "air_pressure". If
-    the time controls the stage, this is known only if one column suits.
-
-    Args:
-        stepping: data from which a run can be resumed (`State.stepping`), among them its target.
-        measures: names of the columns.
-
-    Returns:
-        (name of the column, value); None if the run has no target. If no column belongs to the target, the name is that
-        of the target.
+    A target such as `pressure(0.2)` of one of several loads becomes its column, such as "air_pressure". Without a
+    suitable column, the name is that of the target.
     """
     if "until" not in stepping:
         return None
@@ -156,15 +144,8 @@ def _words(seconds: float) -> str:
 def watch(folder: Any, every: float = 5.0, patience: float = 600.0) -> Iterator[Status]:
     """Yield the status of a run now and after each new state, until the run ends.
 
-    If the folder is missing, empty, or without a state, the function waits for the first state.
-
-    Args:
-        folder: folder of the checkpoint.
-        every: time between two readings of the folder, s.
-        patience: time without a new state after which watching ends, s; 0: yield the present status only.
-
-    Raises:
-        InputError: the folder holds other files, is damaged, or has no state after the time `patience`.
+    It is read every `every` s, until `patience` s pass without a state (0: once). A damaged or other folder is an
+    InputError.
     """
     every, patience = positive("watch: every", every), non_negative("watch: patience", patience)
     seen, since = -1, time.monotonic()

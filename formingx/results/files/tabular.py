@@ -14,19 +14,9 @@ from ...units import NONE, Units
 
 
 def write_path(path: Any, file: Any, units: Units = NONE) -> None:
-    """Write a CSV file with one row per state (`Path.to_csv`; rank 0 writes).
+    """Write a CSV file with one row per state, all columns, stage, kind and iterations (`Path.to_csv`).
 
-    The columns are the stage (in a process), the kind of the state, the number of Newton iterations, and every column
-    of the path.
-
-    Args:
-        path: the computed `Path`.
-        file: its name ends in .csv.
-        units: units for the header, such as "tool_force [N]"; in plane strain forces are per unit depth.
-
-    Raises:
-        InputError: the name has another ending.
-        OSError: the file cannot be written.
+    Units go into the header. Another ending is an InputError, a failed file an OSError.
     """
     units = units.per_depth() if path.scene.kinematics.dimension_of_volume == 2 else units
     staged = any(s.stage for s in path.states)
@@ -37,19 +27,9 @@ def write_path(path: Any, file: Any, units: Units = NONE) -> None:
 
 
 def write_profile(profile: Any, file: Any, comm: Any) -> None:
-    """Write a CSV file with one row per bottom point of a sheet (rank 0 writes).
+    """Write a CSV file with one row per bottom point of a sheet, its arc lengths, positions and thickness (`Profile`).
 
-    The columns are reference radius and arc length, deformed arc length, deformed positions of bottom and top point,
-    thickness, and thickness ratio (`Profile`).
-
-    Args:
-        profile: the `Profile` of the sheet in a state.
-        file: its name ends in .csv.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: the name has another ending.
-        OSError: the file cannot be written.
+    Rank 0 writes. Another ending is an InputError, a failed file an OSError.
     """
     columns = ["reference_radius", "reference_length", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top",
                "thickness", "thickness_ratio"]
@@ -61,15 +41,7 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
 def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
     """Write a CSV file with a header row; numbers are written with all their digits (rank 0 writes).
 
-    Args:
-        file: its name ends in .csv.
-        header: names of the columns.
-        rows: rows of the table, each with one value per column.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: the name has another ending.
-        OSError: the file cannot be written.
+    Another ending than .csv is an InputError, a failed file an OSError.
     """
     file = named("to_csv", file, ".csv")
 
@@ -84,17 +56,7 @@ def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], 
 
 
 def write_summary(file: Any, summary: dict[str, Any], comm: Any) -> None:
-    """Write key numbers as a JSON file (rank 0 writes).
-
-    Args:
-        file: name of the file.
-        summary: {name: number, text, list or dictionary}.
-        comm: MPI communicator.
-
-    Raises:
-        ValueError: a number is nan or infinite.
-        OSError: the file cannot be written.
-    """
+    """Write key numbers as JSON on rank 0; a ValueError for nan or inf, an OSError for the file."""
     text = json.dumps(summary, indent=2, allow_nan=False, default=float) + "\n"
     on_root(comm, lambda: replace(file, lambda stream: stream.write(text)))
 
@@ -111,13 +73,7 @@ def versions() -> dict[str, str]:
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:
     """Call a function on rank 0 alone, and return its result on all ranks; collective.
 
-    Args:
-        comm: MPI communicator.
-        action: function without arguments.
-
-    Raises:
-        OSError: the function raised it on rank 0. A ValueError or ImportError of the function is raised in the same
-            way, on all ranks.
+    Its OSError, ValueError or ImportError is raised on all ranks.
     """
     result, error = None, None
     if comm.rank == 0:
@@ -133,16 +89,7 @@ def on_root(comm: Any, action: Callable[[], Any]) -> Any:
 
 
 def named(caller: str, file: Any, *endings: str) -> Any:
-    """Check the name of a file, and return it as a `pathlib.Path`.
-
-    Args:
-        caller: name of the calling method, for the message.
-        file: name of the file.
-        endings: allowed endings, such as ".csv".
-
-    Raises:
-        InputError: the name has another ending.
-    """
+    """Return the name of a file as a `pathlib.Path`; an InputError by `caller` for another ending."""
     file = file_path(f"{caller}: file", file)
     if file.suffix.lower() not in endings:
         other = {".xlsx": "to_excel", ".csv": "to_csv"}.get(file.suffix.lower())

@@ -19,19 +19,10 @@ from .report_data import progress
 
 
 def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NONE) -> None:
-    """Draw the animation of a path (`Path.animate`).
+    """Draw the animation of a path to a .gif or .mp4 file (`Path.animate`).
 
-    Args:
-        path: the computed `Path`.
-        file: its name ends in .gif or .mp4.
-        frames: number of frames.
-        seconds: duration, s; the last frame is shown for one second more.
-        units: units for the labels.
-
-    Raises:
-        InputError: the name has another ending, or ffmpeg is missing for an MP4. `frames` or `seconds` is not positive.
-            The body is not a sheet, or the path has one state only.
-        OSError: the file cannot be written.
+    `seconds` is the duration, with one more for the last frame. Another ending, missing ffmpeg, no sheet or a single
+    state is an InputError, a failed file an OSError.
     """
     file = files.named("animate", file, ".gif", ".mp4")
     if file.suffix.lower() == ".mp4" and _ffmpeg() is None:
@@ -72,15 +63,7 @@ def _ffmpeg() -> str | None:
 
 
 def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
-    """Return the positions of frames along a path, evenly spaced over the progress of the process.
-
-    Args:
-        path: the computed `Path` of a sheet.
-        frames: number of frames.
-
-    Returns:
-        For each frame a state, the next state, and the position of the frame between them, 0 to 1.
-    """
+    """Return (state, next state, position 0 to 1) of frames evenly spaced over the progress of the process."""
     profiles = [path.profile(state) for state in path.states]
     done = progress({c: path[c] for c in path.columns}, profiles)
     found = []
@@ -92,16 +75,10 @@ def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
 
 
 def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
-    """Return the columns of the loading curve of each stage.
+    """Return {stage: (column x, column y)} of the loading curves.
 
-    Pressures and travels that are constant in the stage are left out. If all are constant, the curve shows a force
-    over the process time, or the pole height if the forces are constant, too.
-
-    Args:
-        path: the computed `Path`.
-
-    Returns:
-        {name of the stage: (name of the column x, name of the column y)}.
+    Constant pressures and travels are left out. If all are constant, a force over the process time is drawn, or the
+    pole height.
     """
     found = {}
     for stage in dict.fromkeys(state.stage for state in path.states):
@@ -120,13 +97,8 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
 def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool, units: Units) -> list[Any]:
     """Return the frames of the animation as images.
 
-    Args:
-        shapes: `Profile` of the sheet in each frame.
-        tools: for each frame pairs of an active tool and its displacement (r, z), shape (2,), length.
-        now: for each frame a pair: names (x, y) of the columns of the loading curve, and their values [x, y] there.
-        curves: {(x, y): values of both columns along the path, shape (m,) each}.
-        axisymmetric: False in plane strain.
-        units: units for the labels.
+    `tools` has (tool, displacement (2,)) of active tools and `now` ((x, y) columns, their values) in each frame;
+    `curves` maps (x, y) to values (m,) each.
     """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
@@ -164,15 +136,7 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
 
 
 def _curve(axes: Any, names: tuple[str, str], curve: list, point: list[float], units: Units) -> None:
-    """Draw the loading curve, and a dot at the state of the frame.
-
-    Args:
-        axes: matplotlib axes, which are cleared.
-        names: names of the columns (x, y).
-        curve: values of both columns along the path, shape (m,) each.
-        point: values of both columns in the frame.
-        units: units for the labels.
-    """
+    """Draw the loading curve, values (m,) of columns x and y, and a dot at the state of the frame."""
     x, y = map(units.label, names)
     axes.clear()
     axes.grid(True, color="0.9", linewidth=0.7)
@@ -184,13 +148,7 @@ def _curve(axes: Any, names: tuple[str, str], curve: list, point: list[float], u
 
 
 def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
-    """Write images as an animated GIF; the last one is shown for one second more.
-
-    Args:
-        pictures: the images.
-        seconds: duration of all images together, without the second more, s.
-        stream: binary stream of the file.
-    """
+    """Write images as an animated GIF of `seconds`, with one second more for the last one."""
     from PIL import Image
     pictures = [picture.quantize(256, dither=Image.Dither.NONE) for picture in pictures]
     each = max(int(1000 * seconds / len(pictures)), 20)
@@ -201,13 +159,7 @@ def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
 def _save_mp4(pictures: list[Any], seconds: float, stream: Any) -> None:
     """Write images as an MP4 with H.264, which every player reads; the last one is shown for one second more.
 
-    Args:
-        pictures: the images.
-        seconds: duration, s.
-        stream: binary stream of the file, which is closed.
-
-    Raises:
-        OSError: ffmpeg failed.
+    The stream is closed. A failure of ffmpeg raises an OSError.
     """
     width, height = (2 * (n // 2) for n in pictures[0].size)              # H.264 wants even numbers
     rate = len(pictures) / seconds

@@ -20,11 +20,7 @@ DIGITS = 5
 
 @functools.cache
 def library() -> str:
-    """Return the source of plotly.js, compressed and in base64 (`packed`).
-
-    Raises:
-        InputError: plotly is not installed.
-    """
+    """Return the source of plotly.js, compressed and in base64; InputError without plotly."""
     try:
         package = resources.files("plotly")
     except ImportError:
@@ -44,15 +40,7 @@ def packed(text: str) -> str:
 
 
 def data(records: list[ReportData], names: list[str], units: Units, extra: dict[str, Any] | None = None) -> str:
-    """Return all data that the script `report.js` of a page draws, as JSON text.
-
-    Args:
-        records: the runs.
-        names: names of the runs.
-        units: units for the labels.
-        extra: {name: value} of further entries in the data of each run, such as the "mesh" of a sheet in three
-            dimensions; default none.
-    """
+    """Return all data that `report.js` draws, as JSON text; `extra` has further entries of each run."""
     runs = [_run(record, name, units) | (extra or {}) for record, name in zip(records, names)]
     charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
                                   _filling(records, names, units), *_walls(records, names, units)) if chart]
@@ -82,12 +70,8 @@ def _run(record: ReportData, name: str, units: Units) -> dict[str, Any]:
 def _sheet(record: ReportData, units: Units) -> dict[str, Any]:
     """Return the data of a sheet for `report.js`, at no more than 101 stations along it and in the drawn states.
 
-    Returns:
-        "from": "R" or "Z", the reference coordinate that names the m stations. "material": this coordinate of the
-        stations, shape (m,). "bottom", "top": deformed positions of the faces, shape (states, 2, m). "start", "end":
-        deformed positions of the edges through the wall at the first and the last station, shape (states, 2, k), and
-        "weights": `Profile.end_weights` at the stations, shape (2, m). "fields": {label with unit: values, shape
-        (states, m)} of the wall, the wall ratio, and all fields of the record.
+    With m stations: "from" (R or Z), "material" (m,); "bottom", "top" (states, 2, m), "start", "end" (states, 2, k),
+    "weights" (2, m); "fields" {label: (states, m)}.
     """
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, FRAMES + 1)).round().astype(int))
@@ -116,23 +100,15 @@ def _edge(profile: Any, k: int) -> np.ndarray:
 
 
 def _label(record: ReportData, units: Units, key: str) -> str:
-    """Return the label of a field with its unit.
-
-    Args:
-        record: the run, for the unit of temperatures.
-        units: units of the script.
-        key: name of the field, such as "contact pressure".
-    """
+    """Return the label of a field, such as "contact pressure", with its unit."""
     return f"{key}, {record.unit}" if key == "temperature" and record.unit else units.label(key.replace(" ", "_"), key)
 
 
 def _tools(record: ReportData) -> list[dict[str, Any]]:
     """Return the data of each tool of a section for `report.js`.
 
-    Returns:
-        For each tool a dictionary. "name": its name. "line": the outline, shape (2, n). "shell": the outline moved
-        inwards, shape (2, n), to draw the tool with a thickness. "moves": displacement (r, z) per unit of travel.
-        "travel": travel in each drawn state, None while the tool is inactive.
+    "line" and, moved inwards, "shell" have shape (2, n); "moves" is the displacement (r, z) per travel, "travel" that
+    of each state, None while inactive.
     """
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
@@ -169,12 +145,7 @@ def _loading(records: list[ReportData], names: list[str], units: Units) -> list[
 def _driven(record: ReportData, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
     """Return a loading curve for each travel and each pressure that changes in a stage.
 
-    Args:
-        record: the run.
-        stage: slice of the states of the stage.
-
-    Returns:
-        For each curve the names of the columns x and y, and their values in the n states of the stage, shape (n,) each.
+    It has the names of x and y, and their values in the n states, (n,) each.
     """
     found, measures = [], record.measures
     for column, values in measures.items():
@@ -223,13 +194,7 @@ def _in_time(records: list[ReportData], names: list[str], units: Units) -> list[
 
 
 def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
-    """Return a curve as data of plotly, with dots at the states if there are at most 60.
-
-    Args:
-        x: values at the states, shape (n,).
-        y: values at the states, shape (n,).
-        name: name of the curve in the legend.
-    """
+    """Return a curve (n,) as data of plotly, with dots at the states if there are at most 60."""
     return {"x": rounded(x), "y": rounded(y), "name": name, "marker": {"size": 4},
             "mode": "lines+markers" if len(x) <= 60 else "lines"}
 
@@ -279,17 +244,9 @@ def _walls(records: list[ReportData], names: list[str], units: Units) -> list[di
 
 
 def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> dict[str, Any] | None:
-    """Return a chart as data for `report.js`, or None without curves.
+    """Return a chart as data for `report.js`; None without curves.
 
-    Args:
-        title: title of the chart.
-        x: label of the horizontal axis.
-        y: label of the vertical axis.
-        traces: the curves as data of plotly: "x", "y", "name", "mode".
-        zero: axis that begins at 0, "x" or "y"; "": none.
-
-    Returns:
-        The arguments under their names, with the curves as plotly's scatter traces.
+    "x" or "y" in `zero` makes that axis begin at 0.
     """
     if not traces:
         return None
@@ -298,13 +255,7 @@ def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> di
 
 
 def rounded(values: Any, each: bool = False) -> list:
-    """Return the numbers of an array as nested lists, rounded to five digits (`DIGITS`).
-
-    Args:
-        values: an array of one or more dimensions; its rows run along the last one.
-        each: True: each number has five significant digits. False: the largest number of a row has five, and the other
-            numbers of the row are rounded to the same decimal place.
-    """
+    """Return an array as nested lists, rounded to five digits of the largest number of a row, or of each."""
     values = np.asarray(values, dtype=float)
     size = np.abs(values) if each else np.abs(values).max(initial=0.0)
     unit = 10.0 ** (np.floor(np.log10(np.where(size > 0, size, 1.0))) + 1 - DIGITS)

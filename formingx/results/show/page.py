@@ -9,13 +9,7 @@ from typing import Any
 
 
 def page(title: str, body: list[str], tail: str = "") -> str:
-    """Return a whole HTML page with its style sheet.
-
-    Args:
-        title: title of the browser window; it is no heading of the page.
-        body: elements of the page in order, as HTML.
-        tail: HTML after the elements, such as scripts.
-    """
+    """Return a whole HTML page with its style sheet and scripts `tail`; `title` is that of the window."""
     style = resources.files(__package__).joinpath("report.css").read_text()
     return (f"<!doctype html>\n<html lang=en><head><meta charset=utf-8><title>{html.escape(title)}</title>"
             f"<meta name=viewport content='width=device-width, initial-scale=1'><style>{style}</style></head>\n<body>"
@@ -23,12 +17,7 @@ def page(title: str, body: list[str], tail: str = "") -> str:
 
 
 def table(head: list[str], rows: list[list[str]]) -> str:
-    """Return a table as HTML; columns of numbers are aligned right.
-
-    Args:
-        head: name of each column, as text; if all names are empty, the table has no head.
-        rows: the cells of each row, as text.
-    """
+    """Return a table of texts as HTML, numbers aligned right; without names of columns it has no head."""
     numbers = [any(head) and all(_is_number(row[k]) for row in rows) for k in range(len(head))]
 
     def line(tag, row):
@@ -49,36 +38,19 @@ def _is_number(text: str) -> bool:
 
 
 def details(title: str, content: str) -> str:
-    """Return a collapsed section as HTML: a click on its title shows its content.
-
-    Args:
-        title: the title, as text.
-        content: the content, as HTML.
-    """
+    """Return a collapsed section as HTML: a click on its title shows its content."""
     return f"<details><summary>{html.escape(title)}</summary>{content}</details>"
 
 
 def figure(figure: Any, caption: str, kind: str = "wide") -> str:
-    """Return a matplotlib figure with a caption as HTML; the figure is an embedded PNG picture.
-
-    Args:
-        figure: the matplotlib figure.
-        caption: text below it.
-        kind: "wide", or "small" for less than the full width.
-    """
+    """Return a matplotlib figure with a caption as HTML, as an embedded PNG picture, "wide" or "small"."""
     stream = io.BytesIO()
     figure.savefig(stream, dpi=140)
     return picture(stream.getvalue(), caption, kind)
 
 
 def picture(png: bytes, caption: str, kind: str) -> str:
-    """Return a PNG picture with a caption as HTML; the picture is embedded.
-
-    Args:
-        png: content of the PNG file.
-        caption: text below the picture.
-        kind: "wide", or "small" for less than the full width.
-    """
+    """Return a PNG picture with a caption as HTML, embedded, "wide" or "small"."""
     text = html.escape(caption, quote=True)
     return (f"<figure class={kind}><img alt='{text}' src='data:image/png;base64,{base64.b64encode(png).decode()}'>"
             f"<figcaption>{text}</figcaption></figure>")
@@ -87,11 +59,7 @@ def picture(png: bytes, caption: str, kind: str) -> str:
 def logarithmic(lines: list[list[float]], x: str, y: str, caption: str) -> str:
     """Return a small figure of lines with a logarithmic vertical axis and a caption, as HTML with an SVG drawing.
 
-    Args:
-        lines: positive values of each line, drawn over 1, 2, 3, ...; empty lines are left out.
-        x: label of the horizontal axis.
-        y: label of the vertical axis.
-        caption: text below the figure.
+    Values of a line are positive, drawn over 1, 2, 3, ...; empty lines are left out.
     """
     values = [value for line in lines for value in line]
     low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
@@ -127,10 +95,5 @@ def lines(text: str) -> str:
 
 
 def number(value: float, scale: float = 0.0) -> str:
-    """Return a number as text with six significant digits.
-
-    Args:
-        value: the number.
-        scale: size of values without round-off; a number smaller than 1e-9 times this is shown as 0.
-    """
+    """Return a number with six significant digits; below 1e-9 times `scale` it is 0."""
     return f"{0.0 if abs(value) < 1e-9 * scale else value:.6g}"

@@ -6,19 +6,9 @@ from ...figures import new_axes
 
 
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
-    """Draw one output quantity of a path over another (`Path.plot`).
+    """Draw one output quantity of a path over another on matplotlib axes, and return them (`Path.plot`).
 
     States are dots on a smooth line. Limit points are circled; states after a snap-through are diamonds.
-
-    Args:
-        path: the computed `Path`.
-        y: name of the column on the vertical axis.
-        x: name of the column on the horizontal axis.
-        axes: matplotlib axes; default new ones.
-        style: keyword arguments of matplotlib's `plot`.
-
-    Returns:
-        The matplotlib axes; `axes.figure.savefig` saves them.
     """
     axes = axes if axes is not None else new_axes()
     drawn, = axes.plot(*path.curve(x, y), **style)
@@ -38,13 +28,6 @@ def convergence(path: Any, axes: Any = None) -> Any:
 
     .. math::
         |\Delta x| / |x|
-
-    Args:
-        path: the computed `Path`.
-        axes: matplotlib axes; default new ones.
-
-    Returns:
-        The matplotlib axes.
     """
     axes = axes if axes is not None else new_axes()
     lines = [[i.correction for i in state.history if i.correction > 0] for state in path.states]
@@ -59,13 +42,8 @@ def convergence(path: Any, axes: Any = None) -> Any:
 def main_columns(columns: list[str]) -> tuple[str, str]:
     """Return the names (x, y) of the columns of the main loading curve.
 
-    If there is a travel, the curve is the force of the tool over its travel. Else, if there is a pressure, it is the
-    pressure over the pole height. Else it is the pole height over the process time or, without time, the first column
-    over the pole height. Without a pole height, the enclosed volume, the strain energy or the volume
-    error takes its place.
-
-    Args:
-        columns: names of all columns of the path, in their order.
+    It is the tool force over the travel, else the pressure or, over time, the pole height. Enclosed volume, strain
+    energy or volume error replace a missing pole height.
     """
     travel = next((c for c in columns if c.endswith("travel")), None)
     if travel:
@@ -82,11 +60,7 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
 def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
     """Draw the section of a deformed sheet as coloured strips between its two faces.
 
-    Args:
-        axes: matplotlib axes.
-        profile: the `Profile` of the sheet at n nodes.
-        scale: factors by which r and z are multiplied, such as (-1, 1) for the mirror image.
-        colours: colours at the nodes, (red, green, blue, opacity) from 0 to 1, shape (n, 4).
+    `scale` multiplies r and z; colours at the nodes are (red, green, blue, opacity) from 0 to 1, shape (n, 4).
     """
     import numpy as np
     from matplotlib.collections import PolyCollection
@@ -98,13 +72,9 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
 
 
 def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
-    """Return the lower left and the upper right corner (r, z) of a box around deformed sheets, length.
+    """Return the lower left and upper right corner (r, z) of a box around sheets, length, with 6 % margin.
 
-    The box has a margin of 6 % of its larger side.
-
-    Args:
-        profiles: a `Profile` of each sheet.
-        mirrored: True to include the mirror images of the sheets at r = 0.
+    `mirrored` includes the mirror images at r = 0.
     """
     import numpy as np
     points = np.vstack([profile.outline for profile in profiles])
@@ -116,14 +86,7 @@ def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
 
 
 def outline(profile: Any, axes: Any, scale: float = 1.0, **style: Any) -> None:
-    """Draw the section of a deformed sheet as an area in one colour.
-
-    Args:
-        profile: the `Profile` of the sheet.
-        axes: matplotlib axes; r points to the right.
-        scale: factor by which r and z are multiplied.
-        style: keyword arguments of matplotlib's `fill`.
-    """
+    """Draw the section of a deformed sheet, times `scale`, as an area in one colour; r points right."""
     points = scale * profile.outline
     axes.fill(*points.T, **{"linewidth": 0.8, "edgecolor": style.get("color"), **style})
     axes.set_aspect("equal")

@@ -65,26 +65,10 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
 
 def write(records: ReportData | list[ReportData], file: Any, title: str, failure: Any, comm: Any, units: Units = NONE,
           density: float | None = None, trim: Any = None, names: list[str] | None = None) -> FilePath:
-    """Write the report of one or several records (`report`, `Path.report`).
+    """Write the report of one or several records, and return its path (`report`, `Path.report`).
 
-    Args:
-        records: a `ReportData`, or a list of them.
-        file: its name ends in .html.
-        title: heading of the page; "": a default.
-        failure: the `ConvergenceError` that ended the run, if one did.
-        comm: MPI communicator; rank 0 writes.
-        units: units of the script, for the labels.
-        density: density in g/cm3, for the weights in grams.
-        trim: radius at which parts are cut off, or ("height", h), length; None: not cut.
-        names: names of the runs; None: a single run is named by the title.
-
-    Returns:
-        The path of the file.
-
-    Raises:
-        InputError: the name of the file has another ending, plotly is not installed, or a density or a trim is given
-            for a body that is not a sheet.
-        OSError: the file cannot be written.
+    The density is in g/cm3, a trim is a radius or ("height", h), length. Another ending, no plotly, or a density
+    without a sheet is an InputError, a failed file an OSError.
     """
     records = [records] if isinstance(records, ReportData) else records
     names, file = names or [title or "run"], files.named("report", file, ".html", ".htm")
@@ -100,16 +84,9 @@ def write(records: ReportData | list[ReportData], file: Any, title: str, failure
 
 
 def _part(record: ReportData, units: Units, density: float | None, trim: Any) -> Part | None:
-    """Return the key numbers of the part in the last state of a run, or None if the body is not a sheet in a section.
+    """Return the key numbers of the part in the last state of a run, or None for no sheet in a section.
 
-    Args:
-        record: the run.
-        units: units of the script.
-        density: density, g/cm3, or None.
-        trim: radius at which the part is cut off, or ("height", h), length; None: not cut.
-
-    Raises:
-        InputError: a density or a trim is given, but there is no part.
+    A density (g/cm3) or a trim without a part is an InputError.
     """
     if record.profiles[-1] is None:
         if density is not None or trim is not None:
@@ -123,13 +100,7 @@ def _part(record: ReportData, units: Units, density: float | None, trim: Any) ->
 def _page(records: list[ReportData], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
     """Return the report as an HTML page.
 
-    Args:
-        records: the runs.
-        names: names of the runs.
-        parts: for each run its `Part`, or None.
-        title: heading of the page.
-        failure: the error that ended the run, or None.
-        units: units of the script.
+    `parts` has for each run its `Part` or None; `failure` is the error that ended the run, or None.
     """
     alone = len(records) == 1
     body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{introduction(records[0], units)}</p>"]
@@ -149,11 +120,7 @@ def _page(records: list[ReportData], names: list[str], parts: list, title: str, 
 
 
 def scripts(data: str) -> str:
-    """Return the scripts at the end of a page as HTML; they draw the sheet, the tools and the curves.
-
-    Args:
-        data: data of the drawings, as JSON text (`interactive.data`).
-    """
+    """Return the scripts at the end of a page as HTML, which draw the JSON text of `interactive.data`."""
     packed = (("library", interactive.library()), ("data", interactive.packed(data)))
     code = resources.files(__package__).joinpath("report.js").read_text()
     tail = "".join(f"\n<script type='text/plain' id={name}>{text}</script>" for name, text in packed)
@@ -173,11 +140,9 @@ and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothin
 
 
 def _trouble(failure: Any, lead: str) -> list[str]:
-    """Return the error message of a failed run as HTML elements, with a picture of its last admissible state.
+    """Return the error message of a failed run as HTML, with a picture of its last admissible state.
 
-    Args:
-        failure: the `ConvergenceError`, its text, or "" or None without a failure.
-        lead: text before the heading, such as the name of the run.
+    `lead` is the text before the heading, such as the name of the run.
     """
     if not failure:
         return []
@@ -206,13 +171,9 @@ def _details(record: ReportData, units: Units) -> list[str]:
 
 
 def _warnings(record: ReportData, lead: str = "") -> str:
-    """Return the findings on a run as HTML elements, or a sentence that there are none.
+    """Return the findings on a run as HTML, or a sentence that there are none.
 
-    The page shows two lines of each finding, and after a click its whole text.
-
-    Args:
-        record: the run.
-        lead: text before each finding, such as the name of the run.
+    The page shows two lines of each, after the text `lead`, and the whole after a click.
     """
     findings = record.all_findings()
     if record.space:
@@ -231,11 +192,7 @@ def finding_element(found: Finding) -> str:
 
 
 def versions(records: list[ReportData]) -> list[list[str]]:
-    """Return rows (name, value) of a table: date of the report, scripts of the runs, and versions of programs.
-
-    Args:
-        records: the runs.
-    """
+    """Return rows (name, value): date of the report, scripts of the runs, and versions of programs."""
     try:
         version = importlib.metadata.version("formingx")
     except importlib.metadata.PackageNotFoundError:
@@ -247,13 +204,7 @@ def versions(records: list[ReportData]) -> list[list[str]]:
 
 
 def _cards(record: ReportData, found: Part | None, units: Units) -> str:
-    """Return the main numbers of the part and of the run as HTML, in large digits.
-
-    Args:
-        record: the run.
-        found: its part, or None.
-        units: units of the script.
-    """
+    """Return the main numbers of the part and of the run as HTML, in large digits."""
     cards = []
     if found is not None:
         length = f" {units.length}" if units.length else ""
@@ -276,14 +227,7 @@ def _peaks(record: ReportData, units: Units) -> list[tuple[str, str]]:
 
 
 def _answers(records: list[ReportData], names: list[str], parts: list, units: Units) -> str:
-    """Return an HTML table of the key numbers of parts, forces and pressures, with one column per run.
-
-    Args:
-        records: the runs.
-        names: names of the runs.
-        parts: key numbers of the part of each run (`KeyNumbers`), or None.
-        units: units for the labels.
-    """
+    """Return an HTML table of key numbers of parts (or None), forces and pressures, one column per run."""
     columns = [dict((found.rows if found is not None else []) + _peaks(record, units))
                for record, found in zip(records, parts)]
     rows = [[what, *(column.get(what, "") for column in columns)] for what in dict.fromkeys(
@@ -292,12 +236,7 @@ def _answers(records: list[ReportData], names: list[str], parts: list, units: Un
 
 
 def introduction(record: ReportData, units: Units) -> str:
-    """Return sentences on the numbers of states and iterations of a run, on the kinematics and on the units, as HTML.
-
-    Args:
-        record: the run.
-        units: units of the script.
-    """
+    """Return sentences on states, iterations, kinematics and units of a run, as HTML."""
     counts = record.counts
     size = f"{len(record.kinds) - 1} states after the start"
     if counts:
@@ -375,11 +314,7 @@ def _tools(record: ReportData, units: Units) -> str:
 
 
 def _drawn(draw: Callable[[Any], Any]) -> bytes | None:
-    """Return a PNG picture as bytes, or None if there is nothing to draw or a library is missing.
-
-    Args:
-        draw: function that draws the picture into the file given to it.
-    """
+    """Return a PNG picture as bytes; None if there is nothing to draw or a library is missing."""
     with TemporaryDirectory() as folder:
         file = FilePath(folder) / "picture.png"
         try:

@@ -96,13 +96,9 @@ class ReportData:
         return not (self.axisymmetric or self.space)
 
     def control(self, state: int) -> str:
-        """Return the name of the column of the controlled quantity in the stage of a state.
+        """Return the column of the controlled quantity in the stage of a state.
 
-        It is the first pressure, travel or displacement that changes in the stage. If none changes, or if the process
-        time advances in the run, it is the first of all columns.
-
-        Args:
-            state: number of the state, from 0.
+        It is the first pressure, travel or displacement that changes; without one, or in time, the first column.
         """
         first, end = next(ends for ends in self.stage_ranges if state < ends[1])
         changes = [c for c, v in self.measures.items()
@@ -173,14 +169,7 @@ class ReportData:
         return dict(sorted(self.counts.get("limits", {}).items(), key=lambda entry: -entry[1]))
 
     def gaps(self, states: list[int]) -> dict[str, np.ndarray]:
-        """Return the remaining gaps between the sheet and the corners of fixed tools.
-
-        Args:
-            states: numbers of m states with profiles.
-
-        Returns:
-            {name, such as "mould, corner 1": largest distance of the corner from the sheet, shape (m,), length}.
-        """
+        """Return {"mould, corner 1": largest distance from the sheet, shape (m,), length} in m given states."""
         found = {}
         for contact in self.tooling.contacts if states else ():
             if contact.direction is not None or contact.on not in ("top", "bottom", "inner", "outer"):
@@ -193,11 +182,7 @@ class ReportData:
         return found
 
     def _first(self, where: np.ndarray) -> str:
-        """Return the text ", from state ... on" with number, stage and control of the first state under a condition.
-
-        Args:
-            where: True for the states that satisfy the condition, shape (n,).
-        """
+        """Return the text ", from state ... on" of the first state in the mask, shape (n,)."""
         k = int(np.argmax(where))
         stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
         return f", from state {k} on ({stage}{self._control_of(k)})"
@@ -273,11 +258,6 @@ def of_checkpoint(about: dict, states: list[dict]) -> ReportData:
     """Return the data of a run for its report from its checkpoint, without the scene.
 
     Both arguments are results of `formingx.results.files.checkpoint_data.contents`.
-
-    Args:
-        about: data of the file scene.json: the description of the scene, its summary, and versions of programs. Its
-            entry "ended" has the error message and the findings of the run.
-        states: for each state its attributes as {name: value}.
     """
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     ended = about.get("ended") or {"findings": (), "failure": ""}
@@ -297,11 +277,7 @@ def of_checkpoint(about: dict, states: list[dict]) -> ReportData:
 
 
 def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
-    """Return the arguments "heat" and "unit" of `ReportData`; empty for a scene without heat transfer.
-
-    Args:
-        heat: heat transfer of the scene as JSON data, with entries "tools" and "unit", or None.
-    """
+    """Return the arguments "heat" and "unit" of `ReportData`; empty for a scene without heat transfer."""
     if not heat:
         return {}
 
@@ -312,15 +288,9 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
 
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
-    """Return the temperature of a sheet in the states of a checkpoint.
+    """Return {"temperature": values (m,) at the nodes of a sheet}, or {}, in the states of a checkpoint.
 
-    Args:
-        states: data of each state. The entry "memory" has the stored history variables; the entry of the temperature
-            has "points", reference positions, and "temperature", values there.
-        last: profile of the sheet with m nodes, in the last state.
-
-    Returns:
-        For each state {"temperature": values at the nodes of the profile, shape (m,)}; {} without a temperature.
+    The stored history variables in "memory" have "points" and "temperature"; `last` is the profile with m nodes.
     """
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
     numbers = None
@@ -335,16 +305,9 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
 
 
 def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: int = FRAMES) -> list[int]:
-    """Return the numbers of the states to be drawn, in order; all states if their number is at most `count`.
+    """Return the numbers of about `count` states to be drawn, in order, with ends of stages and limit points.
 
-    Ends of stages and limit points are included. The other states are evenly spaced over the mean of two fractions: the
-    progress of the process, and the number of the state over the number of states.
-
-    Args:
-        progressed: progress of the process in n states, by time or motion, from 0 to 1, shape (n,).
-        kinds: kind of each state (`State.kind`).
-        stages: name of the stage of each state.
-        count: approximate number of drawn states.
+    The others are even over the mean of progress, (n,), from 0 to 1, and number of the state.
     """
     n = len(progressed)
     marked = {k for k in range(n) if kinds[k] == "limit point" or stages[k:k + 2] != [stages[k]] * 2} | {0, n - 1}
@@ -356,16 +319,8 @@ def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: i
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
     """Return the progress of a process in n states, from 0 to 1, shape (n,).
 
-    In a run with process time, it is proportional to the time. In stages without time, a change of a control by its
-    whole range counts as a quarter of the total time.
-
-    In a run without time, each step adds two relative changes. One is the change of a control divided by its range, as
-    a mean of all controls. The other is the mean displacement of the middle line of the sheet, divided by the sum of
-    these displacements in all steps. The sum of both, over all steps, is scaled to 1.
-
-    Args:
-        measures: {column: values, shape (n,)}.
-        profiles: `Profile` of the sheet in each state. If one is None, the displacement of the sheet does not count.
+    It is proportional to process time, and a control in stages without time counts a quarter of it. Without time, a
+    step adds the mean change of controls and the mean displacement of the middle line, each over its sum.
     """
     n = len(profiles)
     steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
@@ -394,10 +349,6 @@ class _Fields:
 
     At each node the stress is the largest principal Cauchy stress, the larger one of its values at both faces. The
     temperature is the mean of both faces.
-
-    Args:
-        path: the `Path`, with the states of one mesh.
-        profile: the `Profile` of the sheet, for the reference positions of its nodes.
     """
 
     def __init__(self, path: Any, profile: Profile):
@@ -421,15 +372,7 @@ class _Fields:
 
 
 def _nearest(table: ContactTable, points: list[np.ndarray]) -> np.ndarray:
-    """Return the contact pressure at the m nodes of a profile, shape (m,), stress.
-
-    Each node gets the pressure of the nearest contact point.
-
-    Args:
-        table: contact quantities at the contact points of one face of the sheet.
-        points: reference positions of the m nodes on the bottom face, and opposite them on the top face, shape (m, 2)
-            each, length. The face that is nearer to the contact points is used.
-    """
+    """Return the pressure of the nearest contact point at m nodes, (m,), from points of both faces, (m, 2)."""
     distance, numbers = zip(*(nearest(table.reference_points, p) for p in points))
     nearer = np.argmin([a.mean() for a in distance])
     return table.pressure[numbers[nearer]]

@@ -19,18 +19,9 @@ from ..evaluate.profile import distance_to_line
 
 
 def revolved(profile: Any, file: Any, comm: Any) -> None:
-    """Draw three quarters of a deformed axisymmetric sheet as a PNG (rank 0 draws).
+    """Draw three quarters of an axisymmetric sheet, coloured by the wall ratio, as a PNG (rank 0 draws).
 
-    The colour is the wall over the original thickness. A sheet that is more than twice as high as wide, such as a
-    parison, is drawn as one half.
-
-    Args:
-        profile: the `Profile` of the section.
-        file: name of the picture; it ends in .png.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: the name has another ending, or there is neither a screen nor Xvfb.
+    A sheet more than twice as high as wide is drawn as one half. Another ending, or no screen, is an InputError.
     """
     low, high = _bounds(profile)
     tall = high[1] - low[1] > 4 * high[0]
@@ -44,18 +35,10 @@ def revolved(profile: Any, file: Any, comm: Any) -> None:
 
 
 def extruded(profile: Any, file: Any, comm: Any) -> None:
-    """Draw a deformed sheet in plane strain as a PNG, extruded to 1.5 times its width (rank 0 draws).
+    """Draw a sheet in plane strain, extruded to 1.5 times its width, as a PNG (rank 0 draws).
 
-    The colour is the wall over the original thickness. A half sheet, which begins at r = 0, is completed by its mirror
-    image.
-
-    Args:
-        profile: the `Profile` of the section.
-        file: name of the picture; it ends in .png.
-        comm: MPI communicator.
-
-    Raises:
-        InputError: the name has another ending, or there is neither a screen nor Xvfb.
+    The colour is the wall ratio; a half sheet, from r = 0, gets its mirror image. Another ending, or no screen, is an
+    InputError.
     """
     low, high = _bounds(profile)
     if abs(low[0]) < 1e-6 * (high[0] - low[0]):
@@ -87,13 +70,8 @@ def _mirrored(profile: Any) -> Any:
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
     """Draw the surface that a section sweeps out as a PNG on this rank.
 
-    Args:
-        profile: the `Profile` of the section.
-        stations: parameters of the m successive positions of the section, such as angles, shape (m,).
-        place: function of (points (r, z) of the section, shape (n, 2); parameter) that returns their coordinates x, y
-            and z, shape (n,) each.
-        camera: direction from the sheet to the camera, (x, y, z).
-        file: name of the picture.
+    `place` maps points (n, 2) and one of the `stations` (m,) to x, y, z, (n,) each. The camera is a direction from the
+    sheet.
     """
     pyvista = figures.pyvista()
 
@@ -124,17 +102,9 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, fi
 
 @contextlib.contextmanager
 def plotted(file: Any, height: int = 800) -> Iterator[Any]:
-    """Write a PNG picture of the meshes that a `with` block adds to a plotter.
+    """Write a PNG picture of the meshes that a `with` block adds to the yielded pyvista plotter.
 
-    Args:
-        file: name of the picture.
-        height: height of the picture, pixels; the width is 1000.
-
-    Yields:
-        The pyvista plotter.
-
-    Raises:
-        InputError: there is neither a screen nor Xvfb.
+    It is 1000 pixels wide. Without a screen or Xvfb an InputError is raised.
     """
     pyvista = figures.pyvista()
     picture = io.BytesIO()
@@ -151,11 +121,7 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
 
 
 def shading(values: np.ndarray) -> dict[str, Any]:
-    """Return arguments of pyvista's `add_mesh` that colour a mesh by its array "ratio", with a colour bar.
-
-    Args:
-        values: the array, wall over original thickness, shape (n,); the colours cover its range.
-    """
+    """Return arguments of pyvista's `add_mesh` that colour by "ratio", (n,), with a colour bar over its range."""
     middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
     bar = {"title": "thickness / original\n", "color": "black", "vertical": True, "position_x": 0.85, "position_y": 0.2,
            "height": 0.6, "width": 0.07, "title_font_size": 20, "label_font_size": 18, "fmt": "%.2f", "n_labels": 5}
@@ -164,13 +130,7 @@ def shading(values: np.ndarray) -> dict[str, Any]:
 
 
 def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
-    """Place the camera so that all points fill the window beside the colour bar.
-
-    Args:
-        plotter: the pyvista plotter.
-        camera: direction from the sheet to the camera, (x, y, z).
-        points: points of the drawn surface, shape (n, 3), length.
-    """
+    """Place the camera, at a direction from the sheet, so that points (n, 3) fill the window beside the bar."""
     plotter.camera_position = [tuple(camera), (0, 0, 0), (0, 0, 1)]
     plotter.reset_camera()
     camera, (width, height) = plotter.camera, plotter.window_size
@@ -186,13 +146,10 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 
 @contextlib.contextmanager
 def screen() -> Iterator[None]:
-    """Provide a display within a `with` block: the present one, or a virtual one (Xvfb) that ends with the block.
+    """Provide a display within a `with` block: the present one, or a virtual one (Xvfb) that ends with it.
 
-    Debian's VTK, with which pyvista draws, aborts without a display. VTK from version 9.5 on, as PyPI has it, needs
-    none if the system has EGL or OSMesa.
-
-    Raises:
-        InputError: there is neither a screen nor Xvfb, and VTK needs one.
+    VTK before 9.5 aborts without; later it needs none with EGL or OSMesa. If one is needed and missing, an InputError
+    is raised.
     """
     if os.environ.get("DISPLAY"):
         yield
