@@ -115,8 +115,8 @@ def at_equal_error(found, codes, errors=(1e-2, 1e-3, 1e-4, 1e-5)):
 
 def draw(results, file):
     """Draw error against processor time of the path, and processor time of an iteration against unknowns."""
-    from formingx.results.show import plots
-    figure, (left, right) = plots.figure(2)
+    from formingx import figures
+    figure, (left, right) = figures.figure(2)
     for code in PACKAGES:
         rows = [row for row in results.get("treloar", []) if row["code"] == code and row["error"]]
         left.loglog([row["path_cpu"] for row in rows], [row["error"] for row in rows], "o-", label=code)

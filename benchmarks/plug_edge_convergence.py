@@ -16,9 +16,9 @@ from pathlib import Path
 from mpi4py import MPI
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
 from formingx.results.files.fields import Fields
-from formingx.results.show import plots
 
 RADIUS, THICKNESS, C10, PLUG = 8.89, 0.6985, 0.448, 1.905            # cm, cm, MPa, cm
 CASES = {"fillet": (THICKNESS / 2, 0.3), "sharp": (0.0, 0.3), "fillet, stick": (THICKNESS / 2, "stick"),
@@ -54,7 +54,7 @@ def peak(path, travel):
 
 def draw(rows, last, out):
     """Draw peaks against element size, and the estimated error around the edge on the finest meshes."""
-    figure, axes = plots.figure(1 + len(last), width=4.6, height=4.0)
+    figure, axes = figures.figure(1 + len(last), width=4.6, height=4.0)
     for k, case in enumerate(dict.fromkeys(row["case"] for row in rows)):
         mine = [row for row in rows if row["case"] == case and row["travel_cm"] == TRAVELS[-1] and row["sigma_1_MPa"]]
         axes[0].plot([r["refinement"] for r in mine], [r["sigma_1_MPa"] for r in mine], f"C{k}.-", label=case)

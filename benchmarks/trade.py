@@ -17,8 +17,8 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "demos"))
 from common import COMM, save, say  # noqa: E402
 
 import formingx as fx  # noqa: E402
+from formingx import figures  # noqa: E402
 from formingx.results import files
-from formingx.results.show import plots  # noqa: E402
 
 # scene: size, materials (c10, c01), target pole height, in the thesis' units; Treloar's target lies beyond its limit
 SCENES = {
@@ -120,7 +120,7 @@ def pareto(points):
 
 def draw(results, out):
     """Draw the larger error of pressure and pole thickness against time, a plot for each scene."""
-    figure, axes = plots.figure(len(results), width=5.2, height=4.6)
+    figure, axes = figures.figure(len(results), width=5.2, height=4.6)
     axes = [axes] if len(results) == 1 else axes
     for a, (scene, rows) in zip(axes, results.items(), strict=True):
         points = []

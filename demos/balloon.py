@@ -11,8 +11,8 @@ from common import parser, save, say, summarise
 from relaxing import P1, at_time, cost, times
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 R0, H0 = 1.0, 0.01
 VOLUME = 4 / 3 * np.pi * R0**3                               # V0
@@ -62,7 +62,7 @@ def creep(p, n, accuracy):
 
 def draw(flows, creeps):
     """Return a figure: pressure over stretch, pressure over time after the flow, stretch over time."""
-    figure, (blown, held, crept) = plots.figure(3, width=3.9)
+    figure, (blown, held, crept) = figures.figure(3, width=3.9)
     for k, (q, path) in enumerate(flows.items()):
         end = (STRETCHES[-1] ** 3 - 1) / q
         p, t = path["pressure"] * R0 / H0, path["process_time"]

@@ -11,9 +11,9 @@ from common import parser, save, say, summarise
 from relaxing import cost
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
 from formingx.results.evaluate.profile import refined
-from formingx.results.show import plots
 
 RADIUS, BODY, PRESSURE = 10.0, 33.0, 0.3
 MATERIALS = {"gent": fx.Gent(mu=0.2, Jm=25.0), "neo_hooke": fx.NeoHookean(c10=0.1),
@@ -43,7 +43,7 @@ def main():
     args = options.parse_args()
     elements = (30, 1) if args.quick else (args.elements, args.layers)
     summary = {}
-    figure, (sections, walls, pressures) = plots.figure(3, width=4.0)
+    figure, (sections, walls, pressures) = figures.figure(3, width=4.0)
     for k, name in enumerate(MATERIALS):
         path = blow(name, elements)
         part, profile = path.part(), path.profile()

@@ -12,9 +12,9 @@ from common import COMM, parser, save, say, summarise
 from matplotlib.collections import PolyCollection
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
 from formingx.results.files.fields import Fields
-from formingx.results.show import plots
 
 RADIUS, THICKNESS, C10 = 1.25, 0.082, 2.0
 FILLET, GRIPPED = THICKNESS, 2 * THICKNESS
@@ -81,7 +81,7 @@ def table(numbers):
 
 def draw(numbers, paths, out):
     """Draw the peaks against the refinement, and the sheet at the rim, clamped and between the rings."""
-    figure, (left, *right) = plots.figure(3, width=4.6, height=4.2)
+    figure, (left, *right) = figures.figure(3, width=4.6, height=4.2)
     for held, runs in numbers.items():
         left.plot([int(n) for n in runs], [r["peak_stress_kg_per_cm2_at_stretch_1.5"] for r in runs.values()], ".-",
                   color=COLOURS[held], label=held.replace("_", " "))

@@ -19,6 +19,7 @@ from common import COMM, parser, save, say, summarise, sweep
 from mpi4py import MPI
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
 from formingx.results.show import plots
 
@@ -150,7 +151,7 @@ def line(name, n):
 
 def draw(found, shapes, factorial):
     """Return a figure: the run of the coldest plug, the walls of all plugs, the effects of the factors."""
-    figure, (sections, walls, bars) = plots.figure(3, width=4.2, height=4.2)
+    figure, (sections, walls, bars) = figures.figure(3, width=4.2, height=4.2)
     sections.plot(*POT.mould.outline().T, "k", linewidth=1.2)
     sections.plot(*(POT.plug.outline() + [0, TRAVEL]).T, "0.6", linewidth=1.2)
     for k, (stage, profile) in enumerate(shapes[name_of(MOST)].items()):

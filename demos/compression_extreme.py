@@ -23,8 +23,8 @@ from compression_homogeneous import I1_CONSTANT, exact_force
 from plates import HALF_HEIGHT, NEWTON, block, force, press
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 RATIOS, GRIDS = (5, 10, 20), ((2, 2), (8, 8))
 STUCK = (3.4, 5.23, 6.5, 8.0)
@@ -94,7 +94,7 @@ def main():
 
 def draw(paths):
     """Return a figure of the forces over the compression ratio."""
-    figure, axes = plots.figure()
+    figure, axes = figures.figure()
     ratio = np.geomspace(1.02, 20, 200)
     axes.plot(ratio, exact_force(HALF_HEIGHT / ratio), "k", linewidth=1, label="without friction, exact, eq. (7.6)")
     for (name, path), mark in zip(paths.items(), ("o", "s", ".-", ".-")):

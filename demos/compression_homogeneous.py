@@ -8,8 +8,8 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, RADIUS, block, force, press
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 I1_CONSTANT, PRESSED = 0.10, 0.3288                          # MPa, cm
 
@@ -47,7 +47,7 @@ def main():
         f" {summary['exact_outer_radius_cm']:.5f} cm; volume error {summary['volume_error']:.1e} (thesis: 3.6e-3);"
         f" stress off by {summary['stress_error']:.1e} of (7.7);"
         f" {path.counts.steps} states")
-    figure, axes = plots.figure()
+    figure, axes = figures.figure()
     h = HALF_HEIGHT - path["travel"]
     fine = np.linspace(HALF_HEIGHT, PRESSED, 200)
     axes.plot(HALF_HEIGHT / fine, exact_force(fine), "k", label="exact, eq. (7.6)")

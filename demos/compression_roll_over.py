@@ -8,9 +8,9 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, force, positions, press
 
 import formingx as fx
+from formingx import figures
 from formingx.contact import resultants
 from formingx.results import files
-from formingx.results.show import plots
 
 RATIOS = (1.19, 1.47, 1.87, 2.5, 3.4, 5.23)
 GRIDS = ((8, 4), (16, 8), (24, 16))
@@ -73,7 +73,7 @@ def main():
     states = list(met.values())
     labels = ["H/h = 1", *(f"H/h = {r}" for r in met)]
     draw_grids(path, [path.states[0], *states], labels, elements, args.out / "grids.png")
-    figure, (left, middle, right) = plots.figure(3, width=4.4)
+    figure, (left, middle, right) = figures.figure(3, width=4.4)
     left.plot(HALF_HEIGHT / (HALF_HEIGHT - path["travel"][1:]), NEWTON * path["tool_force"][1:], ".-")
     left.set(xlabel="H / h", ylabel="force, N", title="force on one plate", yscale="log")
     Z = np.linspace(0, HALF_HEIGHT, 101)

@@ -9,8 +9,8 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, block, draw_grids, forces, positions, press
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 STRIP = 0.3125                                               # half of its height, cm
 RATIOS = (1.1, 1.2, 1.3, 1.47)
@@ -40,7 +40,7 @@ def main():
     last = drawn["sandwich"].last
     ratio = HALF_HEIGHT / (HALF_HEIGHT - last.measures["travel"])
     draw_grids(drawn["sandwich"], [last], [f"H/h = {ratio:.4g}"], elements, args.out / "grid.png")
-    figure, axes = plots.figure(width=6.2)
+    figure, axes = figures.figure(width=6.2)
     for name, path in drawn.items():
         axes.plot(HALF_HEIGHT / (HALF_HEIGHT - path["travel"]), NEWTON * path["tool_force"], ".-",
                   label=name.replace("_", " "))

@@ -9,8 +9,8 @@ from common import parser, save, say, summarise
 from plates import HALF_HEIGHT, NEWTON, RADIUS, block, draw_grids, force, forces, press
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 DEFLECTIONS = (0.1, 0.2, 0.3, 0.4)                           # total, cm
 LAWS = ("stick", 0.05, 0.1, 0.2, 0.3, "none")
@@ -60,7 +60,7 @@ def main():
                 "stick_over_lindley": {d: stuck[d] / theirs[d] for d in stuck}}
     summary["further"] = numbers_at_largest_deflection(n, args.out)
     say("stick over Lindley: " + "  ".join(f"{d}: {v:.4f}" for d, v in summary["stick_over_lindley"].items()))
-    figure, axes = plots.figure(width=6.2)
+    figure, axes = figures.figure(width=6.2)
     for name, path in curves.items():
         axes.plot(2 * path["travel"], NEWTON * path["tool_force"], ".-", label=name.replace("mu_", "$\\mu$ = "))
     fine = np.linspace(0, DEFLECTIONS[-1], 100)

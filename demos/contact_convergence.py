@@ -4,7 +4,7 @@ import cup
 from common import parser, save, say, summarise
 from moulding import first_touch, name_of
 
-from formingx.results.show import plots
+from formingx import figures
 
 MEASURES = {"correction": r"$\|\Delta x\|/\|x\|$  (3.5.1)", "work": "work, over its first  (3.5.2)",
             "residual": "residual, over support forces"}
@@ -25,7 +25,7 @@ def main():
     after = next(i for i, state in enumerate(path.states) if state is touch)
     shown = {"before contact": path.states[after - 1], "first touch": path.states[after],
              "contact grows": path.states[after + 3]}
-    figure, axes = plots.figure(len(shown), width=4.4)
+    figure, axes = figures.figure(len(shown), width=4.4)
     summary = {}
     for panel, (name, state) in zip(axes, shown.items()):
         summary[name.replace(" ", "_")] = found = errors(state)

@@ -12,8 +12,8 @@ from common import parser, plain_ticks, save, say, summarise
 from cup import DEPTH, I1_CONSTANT, I2_CONSTANT, RADIUS, THICKNESS
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 CORNER = THICKNESS / 8
 PRESSURES = (15.0, 30.0, 60.0, 160.0)
@@ -76,7 +76,7 @@ def columns(path) -> int:
 
 def draw(runs, walls, truth, last):
     """Draw the minimum wall over the number of columns, and the lengths of the columns."""
-    figure, (left, right) = plots.figure(2, width=5.0)
+    figure, (left, right) = figures.figure(2, width=5.0)
     for k, (name, found) in enumerate(walls.items()):
         left.plot(list(found), [w[last] for w in found.values()], "o-", color=f"C{k}", label=name)
         ends = runs[name][-1].problem.scene.mesh.columns.ends

@@ -10,9 +10,9 @@ from common import parser, save, say, summarise
 from scipy.interpolate import CubicSpline
 
 import formingx as fx
+from formingx import figures
 from formingx.exact.inflation import membrane_inflation
 from formingx.results import files
-from formingx.results.show import plots
 
 THICKNESS = 0.01                                  # over the radius; C0 = 1
 CASES = {"cool_rim": lambda R: 1 + 3 * R**2,
@@ -75,7 +75,7 @@ def largest_errors(found, exact):
 
 def draw(paths, file):
     """Draw modulus, loading curves, and the wall at the largest stretch: solids as lines, membranes dashed."""
-    figure, (left, middle, right) = plots.figure(3, width=4.2)
+    figure, (left, middle, right) = figures.figure(3, width=4.2)
     R = np.linspace(0, 1, 200)
     for k, (case, modulus) in enumerate(CASES.items()):
         left.plot(R, modulus(R), color=f"C{k}", label=case.replace("_", " "))

@@ -11,8 +11,8 @@ from common import parser, save, say, summarise
 from relaxing import at_time, times
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 LDPE = [(129000, 1e-4), (94800, 1e-3), (58600, 0.01), (26700, 0.1), (9800, 1), (1890, 10), (180, 100), (1, 1000)]
 MELTS = {"lodge": fx.KBKZ(LDPE), "wagner": fx.KBKZ(LDPE, fx.LuoTanner(n=0.14, beta=0.018)),
@@ -77,7 +77,7 @@ def main():
     args = options.parse_args()
     accuracy = args.accuracy or (2e-3 if args.quick else 1e-3)
     summary: dict = {"largest_error_of_blocks": {}, "disc": {}}
-    figure, axes = plots.figure(3, width=3.9)
+    figure, axes = figures.figure(3, width=3.9)
     for k, (melt, law) in enumerate(MELTS.items()):
         off = []
         for ax, mode in zip(axes, PULLED):

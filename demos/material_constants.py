@@ -20,6 +20,7 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.exact.inflation import membrane_limit_point
 from formingx.results import files
 from formingx.results.show import plots
@@ -156,7 +157,7 @@ def table(numbers, found):
 def draw(paths, out, quick):
     """Draw figures 4.9 to 4.13."""
     names = {k: f"{k[-1]}: {c10:g}, {c01:g} psi, r$_0$/h$_0$ = {r / h:g}" for k, (r, h, c10, c01) in CASES.items()}
-    figure, (left, right) = plots.figure(2)
+    figure, (left, right) = figures.figure(2)
     for k, (name, label) in enumerate(names.items()):
         radius, _, c10, c01 = CASES[name]
         height, stretch, pressure = paths[name].curve("pole_height", "pole_stretch", "pressure")
@@ -169,7 +170,7 @@ def draw(paths, out, quick):
     save(figure, out / "cases.png")
 
     path, radius = paths["case2"], CASES["case2"][0]
-    figure, (left, right) = plots.figure(2)
+    figure, (left, right) = figures.figure(2)
     height, stretch = path.curve("pole_height", "pole_stretch")
     left.plot(height / radius, stretch**-2, color="tab:blue")
     left.set(xlabel="pole height/r$_0$", ylabel="pole thickness/original", xlim=(0, None), ylim=(0, 1.02))
@@ -181,7 +182,7 @@ def draw(paths, out, quick):
     figure.suptitle("Lai and Holt's sheet (case 2), computed")
     save(figure, out / "lai_holt.png")
 
-    figure, (left, right) = plots.figure(2)
+    figure, (left, right) = figures.figure(2)
     for name, color in (("A", "tab:red"), ("B", "tab:blue")):
         path = paths[name]
         c10, c01 = PLATES[name][2:]

@@ -12,9 +12,9 @@ import numpy as np
 from common import parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.io.csv_files import records
 from formingx.results import files
-from formingx.results.show import plots
 
 DATA = Path(__file__).parent / "data"
 RUBBERS = {"James 1975": "james_1975.csv", "Kawamura 2001": "kawamura_2001.csv"}
@@ -88,7 +88,7 @@ def main():
 
 def picture(out, best, law):
     """Draw stresses over the varied stretch: measured, predicted from the uniaxial test, fitted."""
-    figure, axes = plots.figure(2, width=5)
+    figure, axes = figures.figure(2, width=5)
     for ax, (rubber, file) in zip(axes, RUBBERS.items()):
         l1, l2, P1, P2 = table(file)["biaxial"]
         for k, held in enumerate(np.unique(l2)):

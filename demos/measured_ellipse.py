@@ -14,8 +14,8 @@ import numpy as np
 from common import parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 HALF_WIDTH, HALF_LENGTH, THICKNESS = 30.0, 60.0, 0.1           # along x and y; mm
 RISE, PRESSURE = 11.231, 0.9175 * 6.894757e-3                  # of the middle, mm; MPa
@@ -91,7 +91,7 @@ def largest_change(one, other):
 
 def draw(path, rows, file):
     """Draw the film's rise as lines of equal height, and the strains at the places under every law."""
-    figure, axes = plots.figure(2, width=5)
+    figure, axes = figures.figure(2, width=5)
     axes[0].get_gridspec().set_width_ratios([1, 2])         # the film is twice as long as wide
     wall = path.wall()
     x, y, z = wall.deformed_points.T

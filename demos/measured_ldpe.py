@@ -13,9 +13,9 @@ from common import parser, save, say, summarise
 from relaxing import at_time, times
 
 import formingx as fx
+from formingx import figures
 from formingx.io.csv_files import records
 from formingx.results import files
-from formingx.results.show import plots
 
 DATA = Path(__file__).parent / "data"
 FITTED, PREDICTED = 0.1, (0.03, 0.3)                                        # Hencky rates, 1/s
@@ -136,7 +136,7 @@ def main():
 
 def picture(out, omega, storage, loss, spectrum, strains, measured, card, shear_times, shear):
     """Draw moduli, extension and shear."""
-    figure, (left, middle, right) = plots.figure(3, width=4.2)
+    figure, (left, middle, right) = figures.figure(3, width=4.2)
     x = omega[:, None] * np.array([tau for _, tau in spectrum.pairs])
     G = np.array([G for G, _ in spectrum.pairs])
     for values, computed, label in ((storage, (G * x**2 / (1 + x**2)).sum(1), "G'"), (

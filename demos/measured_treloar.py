@@ -11,9 +11,9 @@ import numpy as np
 from common import parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.materials.inflation import FreeInflation
 from formingx.results import files
-from formingx.results.show import plots
 
 RADIUS, THICKNESS = 1.25, 0.082                                             # cm
 MPA = 1 / 0.0980665                                                         # kg/cm2 in an MPa
@@ -87,7 +87,7 @@ def main():
 
 def picture(out, fits, data):
     """Draw the pressure of a cap of one stretch over the stretch, from the test and from the laws."""
-    figure, axes = plots.figure(2, width=5)
+    figure, axes = figures.figure(2, width=5)
     l, P = data["equibiaxial"]
     for ax, (way, each) in zip(axes, fits.items()):
         ax.plot(l, 4 * np.sqrt(l**2 - 1) * P * MPA * THICKNESS / (RADIUS * l**3), "ko", ms=4, label="equibiaxial test")

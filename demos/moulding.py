@@ -4,6 +4,7 @@ import numpy as np
 from common import COMM, save, say
 
 import formingx as fx
+from formingx import figures
 from formingx.contact import resultants
 from formingx.results import files
 from formingx.results.evaluate.profile import distance_to_line
@@ -115,7 +116,7 @@ def draw_forming(path, states, tool, name: str, unit: str = "psi", side: str = "
     low = min(span[:, 1].min(), max(outline[:, 1].min(), -2 * size)) - 0.05 * size
     high = max(span[:, 1].max(), min(outline[:, 1].max(), 2 * size)) + 0.1 * size
     width = np.clip(4.2 * 1.15 * size / (high - low), 1.8, 4.6)
-    figure, (left, middle, right) = plots.figure(3, width=(width + 9.2) / 3, ratios=(width, 4.6, 4.6))
+    figure, (left, middle, right) = figures.figure(3, width=(width + 9.2) / 3, ratios=(width, 4.6, 4.6))
     left.plot(*outline.T, "k", linewidth=1.5)
     for k, (state, profile) in enumerate(zip(states, profiles)):
         color = f"C{k}"

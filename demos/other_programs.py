@@ -13,9 +13,9 @@ from common import COMM, parser, save, say, summarise
 from scipy.interpolate import CubicSpline
 
 import formingx as fx
+from formingx import figures
 from formingx.exact.inflation import membrane_inflation
 from formingx.results import files
-from formingx.results.show import plots
 
 VM218 = [(1.25, 1.25), (1.8, 2.5), (2.25, 4.0), (2.6, 5.9), (2.9, 7.8), (3.2, 9.8), (3.5, 11.6), (3.62, 12.6),
          (4.1, 15.3), (4.9, 18.8), (5.7, 22.1), (6.2, 24.0), (7.2, 27.9), (8.3, 31.2), (8.9, 32.9), (9.9, 35.8),
@@ -126,7 +126,7 @@ def vm218(elements, out):
         "membrane": (exact := float(height(p))), "theirs_over_membrane": theirs / exact - 1}
         for theirs, p in VM218 if p in (4.0, 24.0, 38.0)}
     found["graph_pressure_over_membrane"] = {f"{w:g}": p / float(pressure(w)) - 1 for w, p in VM218}
-    figure, axes = plots.figure()
+    figure, axes = figures.figure()
     axes.plot(*np.array(VM218).T, "o", color="C1", fillstyle="none", label="VM218's graph")
     axes.plot(*path.curve("pole_height", "pressure"), label="formingx, solid")
     axes.plot(heights, pressures, "k--", linewidth=1, label="membrane theory")

@@ -12,8 +12,8 @@ from common import parser, save, say, summarise
 from relaxing import cost
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 RADIUS, HEATER, COLD, LIMIT, DOME, FORMING = 0.15, 400.0, 25.0, 0.03, 0.06, 0.5
 TIMES = {1: (5, 10, 15), 2: (10, 20, 30), 4: (20, 40, 60)}             # of each thickness, mm: s
@@ -56,7 +56,7 @@ def main():
     args = options.parse_args()
     elements, accuracy = ((8, [2, 1, 2]), 6e-2) if args.quick else ((args.elements, [1, 2, 2, 1]), args.accuracy)
     summary = {"sag_mm": {}, "time_to_limit_s": {}, "temperature_C": {}, "wall": {}, "cost": {}}
-    figure, axes = plots.figure(2, width=5.2)
+    figure, axes = figures.figure(2, width=5.2)
     for k, thickness in enumerate((2,) if args.quick else TIMES):
         path = form(thickness, elements, accuracy)
         met = path.state("heat")

@@ -8,8 +8,8 @@ import numpy as np
 from common import save
 
 import formingx as fx
+from formingx import figures
 from formingx.forms.probes import probe
-from formingx.results.show import plots
 
 RADIUS, HALF_HEIGHT = 1.32, 1.25                             # cm
 NEWTON = 100.0                                               # N in one MPa cm2
@@ -80,7 +80,7 @@ def draw_grids(path, states, labels, elements, file, **size) -> None:
     side = [(RADIUS, Z) for Z in np.linspace(0, HALF_HEIGHT, 41)]
     moved = [positions(path, s, [*side, (0.0, HALF_HEIGHT)]) for s in states]
     wide, heights = max(m[:, 0].max() for m in moved) * 1.05, [m[:, 1].max() * 1.15 for m in moved]
-    figure, _ = plots.figure(1, width=5.2, height=5.2 / wide * sum(heights) + 0.45 * len(states))
+    figure, _ = figures.figure(1, width=5.2, height=5.2 / wide * sum(heights) + 0.45 * len(states))
     figure.clear()
     axes = figure.subplots(len(states), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     for a, state, label, high in zip(axes, states, labels, heights, strict=True):

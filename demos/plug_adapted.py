@@ -23,8 +23,8 @@ from plug_friction import ROUGH, THROUGH, membrane_curve
 from williams_plug import C10, PLUG, RADIUS, THICKNESS
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 FILLET, SHARP = 0.35, THICKNESS / 8
 TRAVELS, SHARP_TRAVELS = (8.0, 12.0, 16.0, 20.0), (8.0, 10.0)
@@ -123,7 +123,7 @@ def print_numbers(mu, fillet, n) -> None:
 
 def draw(ran):
     """Return a figure: force over travel, the membrane dashed, and the columns of the adapted meshes."""
-    figure, (left, right) = plots.figure(2, width=5.0)
+    figure, (left, right) = figures.figure(2, width=5.0)
     for k, ((mu, fillet, _), (_, (travel, force, at, membrane, ends))) in enumerate(ran):
         label = f"$\\mu$ = {mu:g}" + (", edge $h_0/8$" if fillet == SHARP else "")
         left.plot(travel, force, color=f"C{k}", label=label)

@@ -20,6 +20,7 @@ from moulding import cost
 from mpi4py import MPI
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
 from formingx.results.show import plots
 
@@ -122,7 +123,7 @@ def main():
 
 def draw(paths, radius):
     """Return a figure of the stages of the plug that carries the base, and of all walls: figs. 6.16 and 6.17."""
-    figure, (shapes, ratios) = plots.figure(2, width=5.2, height=5.0)
+    figure, (shapes, ratios) = figures.figure(2, width=5.2, height=5.0)
     path = paths["carries"]
     shapes.plot(*MOULD.outline().T, "k", linewidth=1.5)
     for k, stage in enumerate(s for s in dict.fromkeys(s.stage for s in path.states) if s != "plug off"):
@@ -142,7 +143,7 @@ def draw(paths, radius):
 
 def draw_map(found, radii, ways):
     """Return a figure of base, corner and minimum wall over the plug's radius, for every travel and way."""
-    figure, axes = plots.figure(3, width=3.8)
+    figure, axes = figures.figure(3, width=3.8)
     for ax, key in zip(axes, ("base", "corner", "least")):
         for share, way in ways:
             n = [next(m for m in found if (m["way"], m["radius_cm"], m["travel_cm"]) == (way, r, share * DEPTH))

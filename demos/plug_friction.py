@@ -22,9 +22,9 @@ from scipy.interpolate import PchipInterpolator
 from williams_plug import C10, PLUG, RADIUS, THICKNESS, TRAVELS
 
 import formingx as fx
+from formingx import figures
 from formingx.exact.plug import membrane_sliding_over_plug
 from formingx.results import files
-from formingx.results.show import plots
 
 FRICTIONS = (1.0, 0.1, 0.5, 0.3, 0.2)      # begun in this order, two processes are busy to the end
 MOST = 25                                   # stretch of the face that elements are made for, at most
@@ -147,7 +147,7 @@ def print_numbers(mu, n) -> None:
 
 def draw(runs):
     """Return a figure: force over travel, jumps as rings, the membrane dashed, and the wall at the end."""
-    figure, (forces, walls) = plots.figure(2, width=5.0)
+    figure, (forces, walls) = figures.figure(2, width=5.0)
     for k, (mu, found) in enumerate(runs.items()):
         forces.plot(found["travel"], found["force"], color=f"C{k}", label=f"$\\mu$ = {mu:g}")
         forces.plot(*np.transpose(found["jumps"] or [(0, 0)]), "o", color=f"C{k}", fillstyle="none", markersize=3)

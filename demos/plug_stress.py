@@ -12,9 +12,9 @@ from common import COMM, parser, save, say, summarise
 from williams_plug import C10, PLUG, RADIUS, THICKNESS
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
 from formingx.results.files.fields import Fields
-from formingx.results.show import plots
 
 LAWS = {"held": (60, 3), "frictionless": (80, 3)}            # elements
 NEAR = 2 * PLUG                                              # a clamped rim has a peak of its own
@@ -111,7 +111,7 @@ def draw(found, tool, travel, law):
     The scales show units to the right and, as in the thesis, values from 0 to 1 to the left. A ring marks the
     largest value.
     """
-    figure, axes = plots.figure(3, width=4.6, height=3.5, rows=2)
+    figure, axes = figures.figure(3, width=4.6, height=3.5, rows=2)
     x, triangles = found.now.reshape(-1, 2), np.arange(found.now[..., 0].size).reshape(-1, 3)
     near = x[:, 0] < 1.6 * PLUG
     low = x[near, 1].min()
@@ -150,7 +150,7 @@ def draw(found, tool, travel, law):
 
 def draw_faces(paths):
     """Return a figure of the first principal stress along both faces: fig. 6.14."""
-    figure, axes = plots.figure(len(paths), width=4.8)
+    figure, axes = figures.figure(len(paths), width=4.8)
     R = np.linspace(0, 0.97 * RADIUS, 400)
     for ax, (law, path) in zip(axes, paths.items()):
         field = path.stress()

@@ -12,8 +12,8 @@ from common import parser, save, say, summarise
 from relaxing import P0, P1, at_time, cost, times
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 PULLED = {"uniaxial": ("top", "z", np.pi), "equibiaxial": ("rim", "r", 2 * np.pi)}      # face, direction, its area
 STRETCHES, TIMES = (1.5, 2, 3, 5, 10), (0.1, 0.25, 0.5, 1, 2, 5)
@@ -80,7 +80,7 @@ def deviation(found, sought, stretches):
 
 def draw(relaxing, pulling, path):
     """Return a figure: stress over time, stress over stretch, stretch over time."""
-    figure, (held, pulled, crept) = plots.figure(3, width=3.9)
+    figure, (held, pulled, crept) = figures.figure(3, width=3.9)
     for k, (stretch, run_) in enumerate(relaxing.items()):
         held.loglog(*over_time(run_), color=f"C{k}", label=f"{stretch:g}")
     for k, (rate, run_) in enumerate(pulling.items()):

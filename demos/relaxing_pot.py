@@ -16,8 +16,8 @@ from plug_and_vacuum import DEPTH, EDGE, MOULD, SHARE, end_of, thickness
 from relaxing import cost
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 INSTANT = 130.0                                              # psi: 2 (50 + 15), the Mooney sheet of deep_cup.py
 SHEETS = {"relaxing": fx.Viscoelastic(fx.NeoHookean(c10=0.05 * INSTANT), branches=[(0.9 * INSTANT, 1.0)]),
@@ -90,7 +90,7 @@ def line(name, n):
 
 def draw(paths, found):
     """Return a figure: walls with and without a plug, base and corner over the hold time."""
-    figure, (walls, bases) = plots.figure(2, width=5.2)
+    figure, (walls, bases) = figures.figure(2, width=5.2)
     for name, path in paths.items():
         if "vacuum" in {s.stage for s in path.states}:
             profile = path.profile(end_of(path, "vacuum"))

@@ -11,8 +11,8 @@ from common import parser, save, say, summarise
 from scipy.optimize import brentq
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 C10, DRAWN, HOT, COLD, SIZE = 1.0, 1.5, 150.0, 20.0, 1e-3
 MODULI = (200, 2000)
@@ -50,7 +50,7 @@ def exact(mode, modulus):
 def main():
     args = parser("set_block", __doc__).parse_args()
     summary = {mode: {} for mode in MODES}
-    figure, axes = plots.figure()
+    figure, axes = figures.figure()
     at = np.geomspace(0.1, 1e4, 100)
     for mode in MODES:
         line, = axes.plot(at, [exact(mode, modulus) for modulus in at], label=f"{mode}, exact")

@@ -17,9 +17,9 @@ from relaxing import cost
 from relaxing_pot import EDGE, INSTANT, PLUG_RADIUS, TRAVEL
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
 from formingx.results.evaluate.profile import refined
-from formingx.results.show import plots
 
 HOT, COLD, GLASS, SETS = 150.0, 20.0, 10e3, (75, 85)
 RUBBER, RELAXING = fx.NeoHookean(c10=0.05 * INSTANT), (0.9 * INSTANT, 1.0)
@@ -64,7 +64,7 @@ def main():
     args = options.parse_args()
     elements, accuracy = ((8, [1, 1]), 5e-2) if args.quick else ((args.elements, [4, 2, 1]), args.accuracy)
     summary = {}
-    figure, (sections, walls) = plots.figure(2, width=5.2)
+    figure, (sections, walls) = figures.figure(2, width=5.2)
     for name, colour in COLOURS.items():
         if args.quick and name == "glassy_branch":
             continue

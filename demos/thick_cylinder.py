@@ -11,9 +11,9 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.exact.inflation import thick_sphere_limit_point, thick_wall
 from formingx.results import files
-from formingx.results.show import plots
 
 INCH, PSI = 2.54, 6894.757e-6                                  # cm, MPa
 INNER, OUTER, C10, C01 = 7.0, 18.625, 60.0, 10.0               # in, psi
@@ -186,7 +186,7 @@ def thesis_h(stress):
 
 def draw_wall(grids, path, targets, out):
     """Draw figure 3.4, pressure through the wall at 50 cm, and the thesis' h; return errors on the grids."""
-    figure, (left, right) = plots.figure(2, width=5.2)
+    figure, (left, right) = figures.figure(2, width=5.2)
     R = np.linspace(INNER, OUTER, 49)
     true = exact("tube", "50", R)
     l = true.r / R
@@ -217,7 +217,7 @@ def draw_wall(grids, path, targets, out):
 
 def draw_curves(kind, path, targets, out, grids=None):
     """Draw the pressure over the inner displacement (figure 3.3)."""
-    figure, axes = plots.figure()
+    figure, axes = figures.figure()
     u = np.linspace(0, 50, 101)
     axes.plot(u, [exact(kind, d).pressure * PSI for d in u], "k", linewidth=1, label="exact")
     runs = {f"{n} triangles": run for n, run in (grids or {}).items()}

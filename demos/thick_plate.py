@@ -8,8 +8,8 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 RADIUS, THICKNESS, C10, C01 = 7.5, 0.5, 80.0, 20.0
 PRESSURES = ("1", "5", "10", "20", "30", "40.1")
@@ -99,7 +99,7 @@ def table(numbers):
 
 def draw(paths, grid, out, quick):
     """Draw figure 4.3, (a) and (b), and the plate in 3-D."""
-    figure, axes = plots.figure(width=6)
+    figure, axes = figures.figure(width=6)
     for name, color in (("clamped", "tab:red"), ("simply_supported", "tab:blue")):
         paths[name].plot("pole_height", "pressure", axes, label=name.replace("_", " "), color=color)
     p = np.array([0.0, 4.0])
@@ -113,7 +113,7 @@ def draw(paths, grid, out, quick):
     axes.legend(frameon=False, loc="lower right", fontsize=9)
     save(figure, out / "loading_curve.png")
 
-    figure, axes = plots.figure(width=5, height=6)
+    figure, axes = figures.figure(width=5, height=6)
     state = grid.last
     for profile, color in ((grid.profile(grid.states[0]), "0.6"), (grid.profile(state), "tab:blue")):
         rungs = slice(None, None, 2)                           # element edges, not their middles

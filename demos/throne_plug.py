@@ -21,9 +21,9 @@ import plugs
 from common import parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.exact.plug import membrane_under_plug
 from formingx.results import files
-from formingx.results.show import plots
 
 RADIUS = 7.62
 TRAVELS = tuple(float(t) for t in range(1, 11))
@@ -176,7 +176,7 @@ def print_numbers(name, n) -> None:
 
 def draw_forces(paths, summary):
     """Return a figure of forces on the thick and the thin sheet, with those of the membrane: figs. 6.8 and 6.9."""
-    figure, both = plots.figure(2, width=5.0, height=4.4)
+    figure, both = figures.figure(2, width=5.0, height=4.4)
     for axes, title, names in zip(both, ("thick sheet", "thin sheet"), (["thick"], ["thin_treloar", "thin_throne"])):
         laws = (*RUNS, plugs.name_of(MU))
         for k, (law, name) in enumerate((law, name) for law in laws for name in names if name in summary):
@@ -193,7 +193,7 @@ def draw_forces(paths, summary):
 
 def draw_shapes(paths, fillet):
     """Return a figure of profiles and thickness of the thin and the thick sheet: fig. 6.6."""
-    figure, (thin, thick, walls) = plots.figure(3, width=4.4, height=4.8)
+    figure, (thin, thick, walls) = figures.figure(3, width=4.4, height=4.8)
     for axes, name in ((thin, "thin_treloar"), (thick, "thick")):
         sheet, path = SHEETS[name], paths[name, "held"]
         plugs.draw_shapes(axes, path, plugs.states(path, (2, 4, 6, 8, 10)),

@@ -7,6 +7,7 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.exact.inflation import membrane_inflation, membrane_limit_point
 from formingx.results import files
 from formingx.results.show import plots
@@ -81,7 +82,7 @@ def table(numbers):
 def draw(paths, out, quick):
     """Draw figures 4.6, 4.7 and 4.8, the convergence of Newton's method, and the sheet in 3-D."""
     path = paths["simply_supported"]
-    figure, axes = plots.figure()
+    figure, axes = figures.figure()
     for name, style in (("simply_supported", {"color": "tab:blue"}), ("clamped", {"color": "tab:red"})):
         paths[name].plot("pressure", "pole_stretch", axes, label=name.replace("_", " "), **style)
     stretches = np.linspace(1.02, 8.5, 60)
@@ -97,7 +98,7 @@ def draw(paths, out, quick):
     rising, falling = (0.126, 0.440), (0.436, 0.349)
     states = [path.state_at(fx.pressure(p)) for p in rising] + [limit]
     states += [path.state_at(fx.pressure(p), after=limit) for p in falling]
-    figure, (left, right) = plots.figure(2, width=6, ratios=(1, 1.6))
+    figure, (left, right) = figures.figure(2, width=6, ratios=(1, 1.6))
     for k, state in enumerate(states):
         profile, color = path.profile(state), f"C{k}"
         label = f"{state.measures['pressure']:.3f} kg/cm$^2$" + (" (maximum)" if state is limit else "")
@@ -108,7 +109,7 @@ def draw(paths, out, quick):
     figure.legend(*left.get_legend_handles_labels(), frameon=False, loc="outside right center")
     save(figure, out / "profiles_and_thickness.png")
 
-    figure, axes = plots.figure()
+    figure, axes = figures.figure()
     path.plot_convergence(axes)
     axes.set_title("Newton's method, all states, simply supported")
     save(figure, out / "convergence.png")

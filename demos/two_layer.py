@@ -11,6 +11,7 @@ import numpy as np
 from common import COMM, parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
 from formingx.results.show import plots
 
@@ -89,7 +90,7 @@ def table(numbers):
 
 def draw(paths, out, quick):
     """Draw figures 4.14 to 4.16, and the stresses on both sides of the interface."""
-    figure, axes = plots.figure(3, width=4.6)
+    figure, axes = figures.figure(3, width=4.6)
     for k, (name, path) in enumerate(paths.items()):
         load, height = levels(path)
         label = f"{NAMES.get(name, name)}"
@@ -107,7 +108,7 @@ def draw(paths, out, quick):
 
     R = np.linspace(0, 0.98 * RADIUS, 120)
     rows, header = [R], ["R_cm"]
-    figure, axes = plots.figure(3, width=4.6)
+    figure, axes = figures.figure(3, width=4.6)
     colors = (f"C{k}" for k in itertools.count())
     for name, path in paths.items():
         for j, pair in enumerate(interfaces(path, levels(path)[1], R), 1):
@@ -127,7 +128,7 @@ def draw(paths, out, quick):
     save(figure, out / "interface.png")
     files.write_rows(out / "interface.csv", header, np.column_stack(rows).tolist(), COMM)
 
-    figure, axes = plots.figure()
+    figure, axes = figures.figure()
     for k, (name, path) in enumerate(paths.items()):
         path.plot("pressure", "pole_height", axes, color=f"C{k}", label=NAMES.get(name, name))
     axes.axhline(PRESSURE, color="0.6", linewidth=0.8, linestyle=":")

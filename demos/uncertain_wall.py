@@ -10,8 +10,8 @@ import numpy as np
 from common import parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 THICKNESS, SCATTER, VOLUME = 0.03, 0.02, 1.6
 SAMPLES, SEED = 40, 1
@@ -63,7 +63,7 @@ def main():
         if name == "wall":
             inside = np.mean((values > band.low) & (values < band.high))
             summary["walls_inside_the_95_percent_band"] = float(inside)
-            figure, axes = plots.figure(1, width=7)
+            figure, axes = figures.figure(1, width=7)
             for k, one in enumerate(runs):
                 axes.plot(run.profile.reference_length, one.wall, color="0.6", lw=0.4,
                           label=None if k else f"{SAMPLES} samples")

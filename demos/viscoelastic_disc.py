@@ -10,8 +10,8 @@ from common import parser, save, say, summarise
 from relaxing import P1, at_time, cost, times
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 R0, H0 = 1.0, 0.01
 CASES = {0.4: (4, (1.25, 2.5, 3.75, 5)), 4: (2, (0.5, 1, 1.5, 2)), 40: (2, (0.5, 1, 1.5, 2))}    # T: V1, times held
@@ -46,7 +46,7 @@ def changes(numbers, others):
 
 def draw(paths):
     """Return a figure: pressure and pole thickness over volume, pressure at constant volume over time."""
-    figure, (p_axes, t_axes, held) = plots.figure(3, width=3.9)
+    figure, (p_axes, t_axes, held) = figures.figure(3, width=3.9)
     for (model, T), path in paths.items():
         style, color = "-" if model == "membrane" else "k:", None if model == "solid" else f"C{list(CASES).index(T)}"
         states = [s for s in path.states if 0 < s.time <= T * (1 + 1e-12)]

@@ -11,8 +11,8 @@ from common import parser, save, say, summarise
 from relaxing import P1, at_time, cost, times
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 INNER, OUTER = 1.0, 2.0
 SPEEDS, RADII = (0.1, 1, 10), (1.1, 1.25, 1.5, 1.75, 2)
@@ -66,7 +66,7 @@ def change(fine, coarse):
 
 def draw(paths):
     """Return a figure: pressure over inner radius, and inner radius over time after the release, of both shapes."""
-    figure, axes = plots.figure(2, width=5.2)
+    figure, axes = figures.figure(2, width=5.2)
     for kind, style in (("tube", "-"), ("sphere", "--")):
         for k, speed in enumerate(SPEEDS):
             path, end = paths[kind, speed], (OUTER - INNER) / speed + HELD[-1]

@@ -13,8 +13,8 @@ import plugs
 from common import parser, save, say, summarise
 
 import formingx as fx
+from formingx import figures
 from formingx.results import files
-from formingx.results.show import plots
 
 RADIUS, THICKNESS, PLUG, C10 = 8.89, 0.6985, 1.905, 0.448
 TRAVELS = tuple(float(t) for t in range(2, 21, 2))
@@ -89,7 +89,7 @@ def print_driven(n, held) -> None:
 
 def draw(paths, tool, limit):
     """Return a figure of shapes, force curves and thickness: figs. 6.1 to 6.3."""
-    figure, (shapes, slips, forces, thickness) = plots.figure(4, width=3.9, height=4.6)
+    figure, (shapes, slips, forces, thickness) = figures.figure(4, width=3.9, height=4.6)
     plugs.draw_shapes(shapes, paths["held"], plugs.states(paths["held"], (4, 8, 12, 16, 20)), tool)
     shapes.set(title="held")
     plugs.draw_shapes(slips, paths["frictionless"], plugs.states(paths["frictionless"], (2, 4, 6)), tool)
@@ -111,7 +111,7 @@ def draw(paths, tool, limit):
 
 def draw_stretches(path, state):
     """Return a figure of principal stretches and Lagrange strains of the top face, with slip: figs. 6.4 and 6.5."""
-    figure, (stretches, strains) = plots.figure(2, width=5.0)
+    figure, (stretches, strains) = figures.figure(2, width=5.0)
     R = np.linspace(0, 0.99 * RADIUS, 300)
     F = path.stress(state).at_points(np.column_stack([R, np.full_like(R, THICKNESS)])).deformation_gradient
     plane = np.linalg.svd(F[:, :2, :2], compute_uv=False)
@@ -129,7 +129,7 @@ def draw_stretches(path, state):
 
 def draw_rims(clamped, hinged):
     """Return a figure of shapes and forces with both rims: fig. 6.10."""
-    figure, (shapes, forces) = plots.figure(2, width=4.6, height=4.6)
+    figure, (shapes, forces) = figures.figure(2, width=4.6, height=4.6)
     for color, path, label in (("C0", clamped, "clamped"), ("C3", hinged, "hinged")):
         for state in plugs.states(path, (1, 2, 4, 8)):
             shapes.plot(*path.profile(state).middle.T, color=color, linewidth=1.2)
