@@ -119,11 +119,6 @@ void tractions(long points, const double *law, const double *k, long k_step, con
 
 
 def compiled() -> Any:
-    """Compile the contact equations of the penalty law (`formingx.physics.penalty.Law`) in C, once.
-
-    Returns:
-        Library with three functions: `ramp` computes the function F of the normal traction, `elastic_slips` the elastic
-        slips with their gradients, and `tractions` the tractions with their stiffness. Arrays for input and output are
-        passed by their addresses.
-    """
+    """Compile `ramp`, `elastic_slips` and `tractions` of `formingx.physics.penalty.Law` in C, once.
+    Arrays are passed by their addresses."""
     return functions("penalty", _HEADER, _SOURCE)

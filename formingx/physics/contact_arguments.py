@@ -15,17 +15,9 @@ _MAX_POINTS = 100
 
 
 def coefficient(name: str, friction: Any) -> Any:
-    """Check the argument `friction` of a contact and return it as a number or a function of the temperature.
+    """Return the argument `friction` as a number (infinite: "stick", 0: "none") or a function of temperature.
 
-    Args:
-        name: name of the argument, for messages.
-        friction: "stick", "none", a number, a `Table` or a `FunctionOfTemperature`.
-
-    Returns:
-        mu as a number, infinite for "stick" and 0 for "none"; or mu as a function of the temperature.
-
-    Raises:
-        InputError: `friction` is none of these, or negative.
+    Raise `InputError` if it is not "stick", "none", a number from 0, a `Table` or a `FunctionOfTemperature`.
     """
     words = {"none": 0.0, "stick": math.inf}
     if isinstance(friction, str) and friction in words:
@@ -42,18 +34,7 @@ def coefficient(name: str, friction: Any) -> Any:
 
 
 def contact_points(name: str, points: Any) -> str | int:
-    """Check the choice of contact points of a face.
-
-    Args:
-        name: name of the argument, for messages.
-        points: "nodes", or the number of Gauss points of each facet.
-
-    Returns:
-        The argument `points`.
-
-    Raises:
-        InputError: `points` is neither "nodes" nor a number from 1 to 100.
-    """
+    """Return `points`, "nodes" or a number of Gauss points per facet from 1 to 100; else raise `InputError`."""
     if isinstance(points, str) and points == "nodes":
         return points
     number = count(name, points)

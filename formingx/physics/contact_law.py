@@ -99,26 +99,12 @@ class Motion(NamedTuple):
     along: np.ndarray
 
     def to(self, x: np.ndarray) -> Motion:
-        """Predict distances and slips to first order at other positions.
-
-        Args:
-            x: new positions of the points relative to the tool, shape (n, c), length.
-
-        Returns:
-            Predicted distances and slips at x, with the gradients unchanged.
-        """
+        """Predict distances and slips to first order at positions x, shape (n, c), length; gradients stay."""
         slip = self.slip + np.einsum("ni,ni->n", self.along, x - self.position)
         return Motion(x, self.distance_at(x), self.normal, slip, self.along)
 
     def distance_at(self, x: np.ndarray) -> np.ndarray:
-        """Predict the signed distances from the tool to first order at other positions.
-
-        Args:
-            x: new positions of the points relative to the tool, shape (n, c), length.
-
-        Returns:
-            Signed distances, positive inside the tool, shape (n,), length.
-        """
+        """Predict the signed distances, shape (n,), to first order at positions x, shape (n, c), length."""
         return self.distance + np.einsum("ni,ni->n", self.normal, x - self.position)
 
 
@@ -438,13 +424,5 @@ class NormalLaw(ContactLaw):
 
 
 def outer(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the outer products a b^T of n pairs of vectors.
-
-    Args:
-        a: vectors, shape (n, c).
-        b: vectors, shape (n, c).
-
-    Returns:
-        Matrices, shape (n, c, c).
-    """
+    """Return the outer products a b^T of vectors, shape (n, c) each, as matrices, shape (n, c, c)."""
     return a[:, :, None] * b[:, None, :]

@@ -47,18 +47,9 @@ class Kinematics:
     scene_checks: Any = None
 
     def in_axes(self, support: Any, items: list[Any]) -> list[Any]:
-        """Return the constraints of a support, with components numbered by their positions in the attribute `axes`.
+        """Return constraints whose components 0 to 3 (r, z, y, x) are renumbered by their places in `axes`.
 
-        Args:
-            support: the `Support`, for the message.
-            items: constraints of the support (`Constrained` or `ConstrainedMean`), with components numbered 0 for r, 1
-                for z, 2 for y, 3 for x.
-
-        Returns:
-            The constraints with the new numbers.
-
-        Raises:
-            InputError: the body does not have a constrained component.
+        Raise `InputError` if the body does not have a constrained component.
         """
         for item in items:
             if NAMES[item.component] not in self.axes:
@@ -254,15 +245,9 @@ class ThreeD(Kinematics):
     components = 3
 
     def in_axes(self, support, items):
-        """Return the constraints of a support; a clamp or a hinge constrains all nodes of its rim along x, y and z.
+        """Return constraints with components 0 for x, 1 for y, 2 for z, from 0 r, 1 z, 2 y, 3 x; r also means x.
 
-        Args:
-            support: the `Support`.
-            items: constraints of the support (`Constrained`), with components numbered 0 for r, 1 for z, 2 for y, 3 for
-                x; r also means x.
-
-        Returns:
-            The constraints with components numbered 0 for x, 1 for y, 2 for z.
+        A clamp or a hinge constrains all nodes of its rim along x, y and z.
         """
         if {item.component for item in items} == {0, 1}:
             items = [*items, items[0]._replace(component=NAMES.index("y"))]
@@ -279,14 +264,8 @@ class ThreeD(Kinematics):
         return ufl.cofac(self.deformation_gradient(u, X)) * N
 
     def rigid_motions(self):
-        """Return the rigid motions in the plane of the sheet, and its translation normal to the plane.
-
-        Rotations out of the plane are left out, because the tension of an inflated sheet resists them. A flat sheet on
-        one straight rim therefore counts as supported.
-
-        Returns:
-            {name: function from points, shape (n, 3), to displacements, shape (n, 3)}.
-        """
+        """Return the rigid motions in the plane of the sheet, and the translation normal to it, by name.
+        Tension resists the others: a flat sheet on one straight rim counts as supported."""
         return {**{f"translation along {a}": lambda X, k=k: 0 * X + np.eye(3)[k] for k, a in enumerate(self.axes)},
                 "rotation about z": lambda X: np.stack([-X[:, 1], X[:, 0], 0 * X[:, 0]], 1)}
 
@@ -314,15 +293,8 @@ def volume_ratio(F):
 
 
 def is_block(F):
-    """Return whether the entries 13, 23, 31 and 32 of a deformation gradient are zero by construction.
-
-    Args:
-        F: deformation gradient (UFL, shape (3, 3)).
-
-    Returns:
-        True for the F of a section; False if one of these entries is an expression, as in the F of a non-axisymmetric
-        mode.
-    """
+    """Return True if the entries 13, 23, 31 and 32 of F are zero by construction, as in a section.
+    They are expressions in the F of a non-axisymmetric mode."""
     across = ((0, 2), (1, 2), (2, 0), (2, 1))
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
 

@@ -116,14 +116,7 @@ class Pressure(Load):
         self.above = None if above is None else finite("Pressure: above", above)
 
     def share(self, body: Any) -> Any:
-        """Return the share of the pressure that acts at a reference position, 1 or 0.
-
-        Args:
-            body: a `formingx.forms.loaded_body.LoadedBody`, or the forms, with the reference position `X`.
-
-        Returns:
-            The share (UFL scalar); the number 1 if the pressure acts on all of its boundary.
-        """
+        """Return the share of the pressure at the position `body.X`, 1 or 0 (UFL scalar; 1 if it acts everywhere)."""
         if self.above is None:
             return 1
         return ufl.conditional(ufl.gt(body.X[len(body.X) - 1], body.constant(self.above)), 1.0, 0.0)
@@ -252,8 +245,5 @@ def _density(caller: str, given: Any) -> dict[str | None, float]:
 
 
 def _weighed(body: Any, density: dict[str | None, float], integrand: Any) -> Any:
-    """Return the integral of the density times an integrand (UFL scalar) over the reference volume, a UFL form.
-
-    `body` is the `LoadedBody`. `density` is {layer: density}, in which the layer None stands for all layers.
-    """
+    """Return the integral of {layer: density} times a UFL scalar over the reference volume; None: all layers."""
     return sum(body.integral(body.constant(rho) * integrand, layer) for layer, rho in density.items())

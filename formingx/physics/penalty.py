@@ -56,14 +56,7 @@ class Law(NormalLaw):
         self._constants: tuple | None = None
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
-        """Return a copy of the law with other coefficients of friction.
-
-        Args:
-            mu: coefficient of friction, shape () or (n,).
-
-        Returns:
-            The new law.
-        """
+        """Return a copy of the law with other coefficients of friction, shape () or (n,)."""
         law = self._with()
         law._set_friction(mu)
         return law
@@ -87,15 +80,7 @@ class Law(NormalLaw):
         return self._constants
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
-        """Return the mask of the points in contact with the tool, including bonded points.
-
-        Args:
-            x: positions relative to the tool, shape (n, 2), length.
-            old: history variables of the last accepted state, or None.
-
-        Returns:
-            Mask, shape (n,).
-        """
+        """Return the mask of the points in contact, shape (n,), bonded ones included; x: shape (n, 2), length."""
         return (self.distance(x) > -self.theta) | self._bonded(old)
 
     def _bonded(self, old: ContactHistory | None) -> np.ndarray | bool:
@@ -103,20 +88,13 @@ class Law(NormalLaw):
         return False if not self.adhesive or old is None else old.distance > -self.theta
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        r"""Return the contact ramp F(d), eq. (5.13) of Song (1993), and its derivative.
+        r"""Return the contact ramp F(d), eq. (5.13) of Song (1993), shape (n,), length, and its derivative, shape (n,).
 
         .. math:: F(d) = \begin{cases} 0 & d \le -\theta \\ (d + \theta)^2 / (4\theta) & |d| < \theta \\
                   d & d \ge \theta \end{cases}
 
-        F times the penalty k is the normal traction. For a contact that does not separate, F is max(d + theta, 0).
-
-        Args:
-            d: signed distances from the tool, positive inside, shape (n,), length.
-            bonded: mask of the points that have been in contact and cannot separate, shape (n,), or False. There F is
-                d + theta, which may be negative (tension).
-
-        Returns:
-            F, shape (n,), length; dF/dd, shape (n,).
+        d: signed distances, positive inside, shape (n,), length. F times the penalty k is the normal traction. Without
+        separation F is max(d + theta, 0), and d + theta at `bonded` points, which may be negative (tension).
         """
         F, slope = np.empty(len(d)), np.empty(len(d))
         mask = NULL if bonded is False else address(bonded)
@@ -124,17 +102,11 @@ class Law(NormalLaw):
         return F, slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:
-        r"""Return the signed distance from the tool at which the normal traction has a given value N.
+        r"""Return the signed distance, shape (n,), length, at which the normal traction is N, shape (n,), stress.
 
         .. math:: d = \begin{cases} N/k & N > k \theta \\ 2 \sqrt{N \theta / k} - \theta & \text{else} \end{cases}
 
         For a contact that does not separate, d is N/k - theta.
-
-        Args:
-            pressure: normal traction, shape (n,), stress.
-
-        Returns:
-            Signed distance, positive inside the tool, shape (n,), length.
         """
         over = pressure / (self.k * self.theta)
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.adhesive else over - 1)
@@ -146,10 +118,9 @@ class Law(NormalLaw):
 
     @property
     def friction(self) -> np.ndarray:
-        """Ratio of tangential to normal traction at which a point slides, shape () or (n,).
+        """Ratio of tangential to normal traction at which a point slides, shape () or (n,); infinite for stick.
 
-        It is infinite where the point sticks. If the contact has a shear limit that is no constant ratio, this is the
-        ratio for a pressure that tends to 0.
+        With a shear limit that is no constant ratio, it is that of a pressure that tends to 0.
         """
         sticks, mu = np.asarray(self.sticks), np.asarray(self.mu)
         if self.shear_limit is not None:
@@ -157,19 +128,12 @@ class Law(NormalLaw):
         return np.where(sticks, np.inf, mu)
 
     def energy(self, x: np.ndarray, old: ContactHistory | None = None) -> np.ndarray:
-        r"""Return the energy of the normal traction N, its integral over the signed distance d.
+        r"""Return the energy of the normal traction N per reference area, shape (n,), stress times length.
 
         .. math:: \int_{-\theta}^{d} N \, ds = \begin{cases} k (d + \theta)^3 / (12 \theta) & |d| < \theta \\
                   k (d^2/2 + \theta^2/6) & d \ge \theta \end{cases}
 
-        It is 0 for open points. For a contact that does not separate, it is k (d + theta)^2/2.
-
-        Args:
-            x: positions relative to the tool, shape (n, 2), length.
-            old: history variables of the last accepted state, or None.
-
-        Returns:
-            Energy per unit reference area, shape (n,), stress times length.
+        x: shape (n, 2), length. It is 0 for open points, and k (d + theta)^2/2 for a contact that does not separate.
         """
         d, theta = self.distance(x), self.theta
         if self.adhesive:
@@ -178,14 +142,7 @@ class Law(NormalLaw):
         return self.k * np.where(d < theta, inside**3 / (12 * theta), d**2 / 2 + theta**2 / 6)
 
     def start(self, x: np.ndarray) -> ContactHistory:
-        """Return the history variables of points that have not slipped.
-
-        Args:
-            x: initial positions relative to the tool, shape (n, 2), length.
-
-        Returns:
-            The history variables.
-        """
+        """Return the history variables of points at x, shape (n, 2), length, that have not slipped."""
         d = self.distance(x)
         if self.adhesive:                                   # at the outer edge of the ramp it sticks, free of stress
             d = np.where(np.abs(d / self.theta + 1) < RAMP_EDGE, -(1 - RAMP_EDGE) * self.theta, d)
@@ -193,20 +150,11 @@ class Law(NormalLaw):
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the contact tractions at points.
+        """Compute the tractions at positions x, shape (n, 2), length, with their stiffness and history.
 
-        Args:
-            x: positions relative to the tool, shape (n, 2), length.
-            old: history variables of the last accepted state; not used without friction and bond.
-            sense: sense of sliding in the previous Newton iteration, shape (n,): 1 or -1 along the tangent of the tool,
-                0 for a sticking point. A point whose sense would reverse sticks for this one iteration. Otherwise
-                Newton's method would alternate between both senses.
-            expected: distances and slips at which the law is linearised, as the previous iteration predicted them to
-                first order. None: the distances and slips at x, which on a curved tool differ from them in second
-                order. A stiff penalty turns this difference into large tractions.
-
-        Returns:
-            Tractions, with their stiffness and the new history variables.
+        A point whose `sense`, shape (n,), would reverse sticks for one iteration: else Newton's method would alternate.
+        `expected`: distances and slips predicted to first order. On a curved tool those at x differ in second order,
+        which a stiff penalty turns into large tractions.
         """
         n, out = len(x), self._evaluate(x, old, sense, expected)
         N, T, slides = out[2 * n:3 * n], out[3 * n:4 * n], out[4 * n:5 * n]
@@ -219,12 +167,6 @@ class Law(NormalLaw):
 
         In this order it has the traction vectors (2 n), normal tractions, tangential tractions and senses of sliding (n
         each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each).
-
-        Args:
-            x: positions relative to the tool, shape (n, 2), length.
-            old: history variables of the last accepted state, or None.
-            sense: sense of sliding in the previous Newton iteration, 1 or -1, 0 for a sticking point, shape (n,).
-            expected: distances and slips at which the law is linearised; None: those at x.
         """
         near, out = self.nearest(x), np.empty(12 * len(x))
         before, g, dg, limit, grows = NULL, NULL, NULL, NULL, NULL
@@ -245,20 +187,12 @@ class Law(NormalLaw):
         return out
 
     def hoop_stiffness(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
-        r"""Return the derivative of the circumferential traction with respect to the circumferential displacement.
+        r"""Return the derivative of the hoop traction by the hoop displacement, shape (n,), stress/length.
 
         .. math:: \frac{N n_r}{r}
 
-        N is the normal traction and n_r the radial component of the normal of the tool. For a sticking point the
-        stiffness of the elastic slip is added.
-
-        Args:
-            x: positions relative to the tool, shape (n, 2), length.
-            old: history variables of the last accepted state, or None.
-            radius: deformed radius r of the points, shape (n,), length; infinite in plane strain.
-
-        Returns:
-            Stiffness, shape (n,), stress/length.
+        N is the normal traction, n_r the radial component of the normal of the tool. The stiffness of the elastic slip
+        is added for a sticking point. radius: deformed, shape (n,), length; infinite in plane strain.
         """
         turned = super().hoop_stiffness(x, old, radius)
         if not self.has_friction:
@@ -267,34 +201,16 @@ class Law(NormalLaw):
         return turned + np.where(out[4 * n:5 * n] == 0, out[11 * n:], 0.0)           # where points do not slide
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
-        """Return distances and elastic slips of points, with their gradients.
-
-        Args:
-            x: positions relative to the tool, shape (n, 2), length.
-            old: history variables of the last accepted state, or None: slips are 0.
-
-        Returns:
-            Signed distances, positive inside the tool, shape (n,), length, and their gradients, shape (n, 2). Elastic
-            slips, shape (n,), length, and their gradients, shape (n, 2).
-        """
+        """Return distances and elastic slips at x, shape (n, 2), length; slips are 0 without history."""
         near = self.nearest(x)
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
     def one_sided_stiffness(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
-        """Return the stiffness of the points at an accepted state, for the tangent towards the next step.
+        """Return the stiffness at an accepted state for the next step, shape (n, 2, 2), stress/length.
 
-        A point whose gap just closed has the signed distance -theta, at which the contact ramp begins and the stiffness
-        is 0. On the tangent of the path a sticking point without stiffness would slip. Its stiffness is therefore
-        evaluated halfway, at the distance -theta/2.
-
-        Args:
-            x: positions relative to the tool, shape (n, 2), length.
-            old: history variables of the accepted state, or None.
-            newly_closed: mask of the points whose gap closed in the last step, shape (n,).
-
-        Returns:
-            Derivative of the tractions with respect to the positions, shape (n, 2, 2), stress/length.
+        A point whose gap just closed (mask `newly_closed`, shape (n,)) has the distance -theta, where the stiffness is
+        0. On the tangent it would slip, so it gets the stiffness at -theta/2.
         """
         near, now = self.nearest(x), self.tractions(x, old)
         # a body may rest at the outer edge of the ramp
@@ -308,14 +224,9 @@ class Law(NormalLaw):
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
     def _slip(self, x: np.ndarray, near: Nearest, old: ContactHistory) -> tuple[np.ndarray, np.ndarray]:
-        """Return the elastic slip g that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
+        """Return the elastic slip that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
 
-        The result is stored for repeated calls with the same arguments.
-
-        Args:
-            x: positions relative to the tool, shape (n, 2), length.
-            near: geometry of the tool at its points nearest to x, the result of `nearest`.
-            old: history variables of the last accepted state.
+        The result is stored for repeated calls. near: result of `nearest` at x.
         """
         if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
             g, dg = np.empty(len(x)), np.empty((len(x), 2))
@@ -335,20 +246,10 @@ class Law(NormalLaw):
 
 
 def symmetric_stiffness(law: ContactLaw, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
-    """Return a symmetric stiffness of points in a section, for the second variation of the energy.
+    """Return a symmetric stiffness of points in a section, shape (n, 2, 2), stress/length, for second variations.
 
-    Friction couples the tangential traction to the normal displacement, by mu times the penalty where a point slides.
-    This coupling has no energy, and its symmetric part would count every such point as an unstable mode. It is left
-    out: a sliding point has the stiffness of the normal traction, a sticking point that of its elastic slip in
-    addition.
-
-    Args:
-        law: contact law of the points.
-        x: positions relative to the tool, shape (n, 2), length.
-        old: history variables of the last accepted state; None: there are none.
-
-    Returns:
-        Stiffness, shape (n, 2, 2), stress/length.
+    It leaves out the coupling of sliding friction to the normal displacement. That has no energy, and its symmetric
+    part would count every such point as an unstable mode.
     """
     if not law.has_friction:
         return law.tractions(x, old).stiffness
@@ -358,11 +259,5 @@ def symmetric_stiffness(law: ContactLaw, x: np.ndarray, old: ContactHistory | No
 
 
 def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:
-    """Return the `ContactHistory` of n points; the predicted positions at gap closure are set to the present ones.
-
-    Args:
-        x: positions, shape (n, 2), length.
-        d: signed distances, positive inside the tool, shape (n,), length.
-        slip: elastic slips, shape (n,), length.
-    """
+    """Return a `ContactHistory` with closures at the present positions, shape (n, 2); d, slip: (n,), length."""
     return ContactHistory(x, d, slip, x)

@@ -82,13 +82,7 @@ class Support(ScenePart):
         return None
 
     def all_constraints(self) -> list[Constrained | ConstrainedMean]:
-        """Return the constraints that count in the check for rigid motions of the body.
-
-        These are `constraints`, and a constraint of each component in `resists`.
-
-        Returns:
-            List of `Constrained` and `ConstrainedMean`.
-        """
+        """Return `constraints`, and one for each component in `resists`, for the check for rigid motions."""
         resisted = (Constrained(_component(f"{self!r}: resists", c), on=self.on) for c in self.resists)
         return [*self.constraints(), *resisted]
 
