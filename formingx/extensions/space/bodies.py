@@ -15,18 +15,11 @@ from ...mesh.edges import edges_of
 
 
 def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
-    """Divide a closed surface of triangles into groups of bodies whose bounding boxes do not overlap.
+    """Divide a closed surface into groups of bodies whose bounding boxes do not overlap.
 
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        caller: name of the caller, for messages.
-
-    Returns:
-        For each group the row numbers of its triangles, shape (k,). A cavity belongs to the body around it.
-
-    Raises:
-        InputError: the triangles of a body look inward, and the body is not a cavity of another body.
+    points: shape (n, 3), length; triangles: shape (m, 3). Return for each group its row numbers of triangles, shape
+    (k,). A cavity belongs to the body around it. Raise `InputError` if the triangles of a body look inward and it is no
+    cavity.
     """
     parts = _parts(points, triangles)
     bodies = [triangles[part] for part in parts]
@@ -53,14 +46,9 @@ def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> l
 
 
 def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Merge coincident vertices (to 1e-7 of the extent) and drop the triangles that become degenerate.
+    """Merge coincident vertices, shape (n, 3), length, to 1e-7 of the extent, and drop degenerate triangles.
 
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-
-    Returns:
-        Distinct vertices, shape (k, 3), length; vertex numbers of the remaining triangles, shape (l, 3).
+    Return the vertices, shape (k, 3), and the remaining triangles, shape (l, 3).
     """
     size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
     _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
@@ -72,12 +60,8 @@ def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.nd
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
     """Return for each body the indices of its k triangles in `triangles`, shape (k,).
 
-    A body is a set of triangles connected by edges. At an edge of more than two triangles, only the two triangles with
-    the solid between them are connected.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
+    A body is a set of triangles, shape (m, 3), connected by edges. At an edge of more than two triangles, only the two
+    with the solid between them are connected.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -96,16 +80,9 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
     """Return the pairs of triangles at a common edge with solid between them, as row numbers of `triangles`, (2,) each.
 
-    The triangles are sorted by their angle about the edge, counter-clockwise seen from edge[1] towards edge[0]. Seen
-    from outside the solid, the vertices of a triangle are counter-clockwise. Solid therefore lies after a triangle with
-    the edge in the order (edge[1], edge[0]), up to the next one with the opposite order. Of two triangles at equal
-    angles, the one that ends the solid comes first.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers of the m triangles at the edge, shape (m, 3).
-        directed: the two vertex numbers of the edge in the order in which each triangle runs along it, shape (m, 2).
-        edge: vertex numbers of the edge in ascending order, shape (2,).
+    Triangles, shape (m, 3), counter-clockwise from outside, are sorted by their angle about the edge. Solid lies after
+    one with the edge as (edge[1], edge[0]), up to the next with the opposite order (`directed`, shape (m, 2)). At equal
+    angles the one that ends the solid comes first.
     """
     forward = directed[:, 0] == edge[0]
     along = points[edge[1]] - points[edge[0]]

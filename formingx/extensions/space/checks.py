@@ -24,14 +24,9 @@ _LARGE_WALL_ERROR = 0.2
 
 @register("end")
 def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
-    """Find a membrane without relaxed energy (tension-field theory) that is in compression in the last state;
-    collective.
+    """Yield a finding if 0.1 % or more of the reference area of a membrane is in compression; collective.
 
-    Args:
-        path: the computed `Path`.
-
-    Yields:
-        A finding if 0.1 % of the reference area or more is in compression.
+    This holds for the last state, without relaxed energy (tension-field theory).
     """
     scene = path.problem.scene
     if scene.kinematics.components != 3 or scene.model.wrinkles is not None:
@@ -47,11 +42,7 @@ def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
 
 @register("end")
 def error_of_minimum_wall(path: Any) -> Iterator[Finding]:
-    """Find a minimum wall in a mould that finer triangles would change by more than a fifth; collective.
-
-    Args:
-        path: the computed `Path`.
-    """
+    """Yield a finding if finer triangles would change the minimum wall in a mould by over a fifth; collective."""
     scene = path.problem.scene
     if scene.kinematics.components != 3 or not scene.contacts:
         return
@@ -67,16 +58,10 @@ def error_of_minimum_wall(path: Any) -> Iterator[Finding]:
 
 @register("end")
 def lost_pressure(path: Any) -> Iterator[Finding]:
-    """Find a sliding sheet whose supports and tools do not balance the pressure in the last state; collective.
+    """Yield a finding if 2 % or more of the resultant of a pressure on a sliding sheet is left out; collective.
 
     The tangential part of the pressure on nodes that slide is left out (`pressure_on_tools`). On coarse fillets this
-    part has a resultant.
-
-    Args:
-        path: the computed `Path`.
-
-    Yields:
-        A finding if 2 % of the resultant of the pressure or more is left out.
+    part has a resultant, which supports and tools then do not balance.
     """
     problem = path.problem
     works = getattr(problem.forms, "pressure_works", None)
@@ -104,15 +89,9 @@ def lost_pressure(path: Any) -> Iterator[Finding]:
 
 @register("start")
 def coarse_triangles(body: Any) -> Iterator[Finding]:
-    """Find sheets with a triangle longer than half the distance from the edges held in z to the middle of the sheet.
+    """Yield a finding for a triangle longer than half the distance from the edges held in z to the sheet's middle.
 
     The pressure of a blister is then off by 4 to 12 %, or more (tests/test_checks_in_space.py).
-
-    Args:
-        body: the examined body, with its `scene` and the longest `edge` of each triangle.
-
-    Yields:
-        A finding for such a sheet.
     """
     scene = body.scene
     if scene.kinematics.components != 3:
@@ -133,17 +112,10 @@ def coarse_triangles(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def coarse_fillets(body: Any) -> Iterator[Finding]:
-    """Find concave fillets of tools on which a sheet slides, with a radius below the length of its edges; collective.
+    """Yield a finding for each tool with a concave fillet below the length of the edges that slide on it; collective.
 
-    A fillet is reported if its radius is below the median length of the edges of triangles. The direction of the
-    pressure then changes by about a radian from triangle to triangle. Newton's method may diverge, or the sheet snaps
-    from one position on the fillet to another.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each tool with such a fillet.
+    A fillet is reported if its radius is below the median edge of triangles. The direction of the pressure then changes
+    by about a radian from triangle to triangle. Newton's method may diverge, or the sheet snaps.
     """
     scene = body.scene
     tools = [contact for contact in scene.contacts if isinstance(contact.tool, Swept) and not contact.sticks]
@@ -165,14 +137,7 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def asymmetric_across_planes(body: Any) -> Iterator[Finding]:
-    """Find swept tools that cross a plane of symmetry of the scene without being symmetric about it; collective.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each such tool and plane.
-    """
+    """Yield a finding for each swept tool that crosses a plane of symmetry without being symmetric; collective."""
     scene = body.scene
     if scene.kinematics.components != 3:
         return

@@ -54,10 +54,7 @@ class Borders(NamedTuple):
 def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
     """Return unit normals of a smooth surface at the corners of triangles, shape (m, 3, 3).
 
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3), counter-clockwise seen from outside.
-        crease: angle between triangles from which on their edge is sharp, degrees. 0: all triangles are flat.
+    crease: angle from which an edge is sharp, degrees; 0: flat triangles.
     """
     if crease == 0:
         return np.repeat(unit(area_vectors(points, triangles))[:, None], 3, axis=1)
@@ -66,14 +63,9 @@ def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> 
 
 
 def misfit(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> tuple[float, np.ndarray]:
-    """Return the misfit of normals to smooth edges over the turns there, and the place of the largest misfit.
+    """Return the misfit of normals, shape (m, 3, 3), to smooth edges over the turns there, and its worst place.
 
     Both are root mean squares, weighted with the areas of the triangles. The place has the shape (3,), length.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        normals: unit normals at the corners, shape (m, 3, 3).
     """
     m, area = len(triangles), area_vectors(points, triangles)
     i, j = sides_of_edges(triangles)
@@ -92,26 +84,15 @@ def misfit(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> tu
 
 
 def turns(facet: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
-    """Return the angles between pairs of triangles, shape (k,), radians, exact for small angles.
-
-    Args:
-        facet: unit normals of the triangles, shape (m, 3).
-        i: first triangle of each pair, shape (k,).
-        j: second triangle of each pair, shape (k,).
-    """
+    """Return the angles between pairs (i, j) of triangles, shape (k,), radians, exact for small angles."""
     return np.asarray(2 * np.arcsin(np.clip(np.linalg.norm(facet[i] - facet[j], axis=1) / 2, 0, 1)))
 
 
 def corner_groups(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
     """Return the number of the group of each corner of each triangle, shape (m, 3).
 
-    The corners of a group are at one vertex and have one normal. Their triangles are connected by edges that are not
-    sharp. At a tip, such as that of a cone, each corner is a group of its own.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        crease: angle between triangles from which on their edge is sharp, radians.
+    The corners of a group are at one vertex and have one normal. Edges that are not sharp connect their triangles. At a
+    tip, such as that of a cone, each corner is a group. crease: radians.
     """
     m, facet = len(triangles), unit(area_vectors(points, triangles))
     i, j = sides_of_edges(triangles)
@@ -125,12 +106,7 @@ def corner_groups(points: np.ndarray, triangles: np.ndarray, crease: float) -> n
 def _connected(m: int, i: np.ndarray, j: np.ndarray, tips: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the groups of corners that smooth edges connect, shape (m, 3).
 
-    Args:
-        m: number of triangles.
-        i: one side of each smooth edge, shape (k,).
-        j: the other side, shape (k,).
-        tips: mask of the vertices at which no corners are connected, shape (n,).
-        triangles: vertex numbers, shape (m, 3).
+    i, j: the two sides of each smooth edge, shape (k,). tips: mask of vertices without connection, shape (n,).
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -146,17 +122,9 @@ def _tips(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, facet: 
           j: np.ndarray) -> np.ndarray:
     """Return the mask of the vertices that are tips, shape (n,).
 
-    At a tip the normals of the triangles differ from their mean in all directions, and the surface is straight ahead of
-    the vertex: its triangles turn against the next ones by less than half that angle. At the pole of a sphere they turn
-    by the same angle or more.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        groups: groups of the corners, shape (m, 3).
-        facet: unit normals of the triangles, shape (m, 3).
-        i: one side of each smooth edge, shape (k,).
-        j: the other side, shape (k,).
+    At a tip the normals of the triangles differ from their mean in all directions, and the surface is straight ahead:
+    its triangles turn against the next by less than half that angle. At the pole of a sphere they turn by the same
+    angle or more. groups: shape (m, 3). i, j: sides of the smooth edges, shape (k,).
     """
     m, n = len(triangles), int(groups.max()) + 1
     turn = np.zeros(3 * m)                                    # at side k m + t, 0 at a crease
@@ -180,11 +148,6 @@ def _tips(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, facet: 
 
 def mean_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray) -> np.ndarray:
     """Return for each group of corners the mean normal of its triangles, weighted with their angles, shape (groups, 3).
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        groups: groups of the corners, shape (m, 3).
     """
     corners, facet = points[triangles], unit(area_vectors(points, triangles))
     N = np.zeros((int(groups.max()) + 1, 3))
@@ -197,21 +160,13 @@ def mean_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray) 
 
 def flat_directions(points: np.ndarray, triangles: np.ndarray, crease: float
                     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Find planes, and directions in which facets are straight.
+    """Return the plane of each triangle, or -1, shape (m,), and the k edges across which a region is straight.
 
-    Coplanar triangles connected by edges are a region. A facet of a curved surface turns against its neighbour as much
-    as this one against the next. A plane beside a fillet turns half as much against the first facet of the fillet as
-    this one against the second; a cylinder does so along its rulings, where a torus follows. So a region of two
-    triangles or more is straight across an edge if the ratio of the turns there is near 1/2.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        crease: angle between triangles from which on their edge is sharp, radians.
-
-    Returns:
-        Number of the plane to which each triangle belongs, or -1, shape (m,). For k edges across which a region is
-        straight: the triangle, the number of its edge (0, 1, 2), the direction across the edge in its plane, (k, 3).
+    For each edge: triangle, number (0, 1, 2), direction across it in the plane, (k, 3). A region is connected and
+    coplanar. A facet of a curved surface turns as much against one neighbour as against the next. A plane beside a
+    fillet turns half as much against its first facet as this one against the second; so does a cylinder along its
+    rulings, where a torus follows. A region of two triangles or more is thus straight where this ratio is near 1/2.
+    crease: radians.
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
@@ -245,14 +200,8 @@ def _borders(points: np.ndarray, triangles: np.ndarray, facet: np.ndarray, regio
              sides: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> Borders:
     """Return some edges between regions, from both sides.
 
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        facet: unit normals of the triangles, shape (m, 3).
-        region: region of each triangle, shape (m,).
-        turn: angles between the two triangles at k edges, shape (k,), radians.
-        sides: the two sides of these edges, shape (k,) each.
-        kept: mask of the edges that count, shape (k,).
+    region: of each triangle, shape (m,). turn: angles at k edges, shape (k,), radians. sides: both sides, shape (k,)
+    each. kept: mask, shape (k,).
     """
     m, (i, j) = len(triangles), sides
     side, opposite = np.concatenate([i[kept], j[kept]]), np.concatenate([j[kept], i[kept]])
@@ -262,12 +211,7 @@ def _borders(points: np.ndarray, triangles: np.ndarray, facet: np.ndarray, regio
 
 
 def _turn_ahead(borders: Borders, rows: np.ndarray) -> np.ndarray:
-    """Return for some borders the largest turn at the far side of the region beyond, shape (k,), radians; inf if none.
-
-    Args:
-        borders: all borders.
-        rows: numbers of the k borders.
-    """
+    """Return the largest turn at the far side of the regions beyond borders `rows`, shape (k,), radians, or inf."""
     found = np.zeros(len(rows))
     for near, far in _pairs(borders.beyond[rows], borders.region):
         row = rows[near]
@@ -280,12 +224,8 @@ def _turn_ahead(borders: Borders, rows: np.ndarray) -> np.ndarray:
 def _bends_behind(borders: Borders, ends: Borders, rows: np.ndarray) -> np.ndarray:
     """Return the mask of sharp edges from which their region leads to a curved surface at its far side, shape (k,).
 
-    A region between two sharp edges, such as a facet of a cone, has no curvature from one to the other.
-
-    Args:
-        borders: all smooth borders; their turn is 0 where their region is straight.
-        ends: all sharp edges.
-        rows: numbers of the k sharp edges in `ends`.
+    A region between two sharp edges, such as a facet of a cone, has no curvature from one to the other. `borders` are
+    smooth.
     """
     found = np.zeros(len(rows), dtype=bool)
     for near, far in _pairs(ends.region[rows], borders.region):
@@ -296,12 +236,7 @@ def _bends_behind(borders: Borders, ends: Borders, rows: np.ndarray) -> np.ndarr
 
 
 def _pairs(wanted: np.ndarray, regions: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield all pairs (p, q) with wanted[p] equal to regions[q], as two arrays; not too many at once.
-
-    Args:
-        wanted: regions, shape (k,).
-        regions: regions of the borders, shape (b,).
-    """
+    """Yield all pairs (p, q) with wanted[p] equal to regions[q], shapes (k,) and (b,), in moderate blocks."""
     order = np.argsort(regions, kind="stable")
     first = np.searchsorted(regions[order], wanted)
     count, begin = np.searchsorted(regions[order], wanted, side="right") - first, 0
@@ -321,12 +256,6 @@ def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
     The equations of the edges leave modes in which normals tilt alternately, and planes bulge. So the normals of planes
     are given, and normals have no part along straight directions (`flat_directions`). The equations of the pairs of
     vertices across an edge, with a small weight, remove such modes elsewhere.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        groups: groups of the corners, shape (m, 3).
-        crease: angle between triangles from which on their edge is sharp, radians.
     """
     from scipy.sparse import coo_array, diags_array
     area, n = area_vectors(points, triangles), int(groups.max()) + 1
@@ -377,10 +306,9 @@ def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
 
 
 def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
-    """Return the function that solves a system of equations for a right-hand side, shape (n,); MUMPS factorises it.
+    """Return a function that solves for a right-hand side, shape (n,), with the MUMPS factors of a matrix.
 
-    Args:
-        matrix: symmetric positive definite matrix of scipy in compressed rows, shape (n, n).
+    It is symmetric positive definite, of scipy in compressed rows.
     """
     from petsc4py import PETSc
     first, columns = (part.astype(PETSc.IntType) for part in (matrix.indptr, matrix.indices))
@@ -403,15 +331,9 @@ def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
 
 def _equations(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pairs of groups whose normals satisfy (N_a + N_b) . e = 0.
+    """Return the pairs of groups whose normals satisfy (N_a + N_b) .
 
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        groups: groups of the corners, shape (m, 3).
-
-    Returns:
-        Groups of each pair, shape (k, 2); weights of the equations, shape (k,); unit vectors e, shape (k, 3).
+    e = 0, shape (k, 2). Also the weights of the equations, shape (k,), and the unit vectors e, shape (k, 3).
     """
     x = np.zeros((int(groups.max()) + 1, 3))
     x[groups.ravel()] = points[triangles.ravel()]

@@ -17,16 +17,10 @@ Layers that a mould presses flat lie on each other to its penetration.
 
 @register("end")
 def crossing_layers(path: Any) -> Iterator[Finding]:
-    """Find a curved surface whose layers pass through each other, or through a plane of symmetry; collective.
+    """Yield a finding if layers of a curved surface cross each other or a plane of symmetry at the end; collective.
 
     A membrane has no contact with itself. Layers that meet need a tool between them, such as the parting plane of half
     moulds, or a plane of symmetry.
-
-    Args:
-        path: the computed `Path`.
-
-    Yields:
-        A finding for the last state.
     """
     scene = path.problem.scene
     if scene.kinematics.components != 3 or scene.mesh.flat:
@@ -52,15 +46,9 @@ def _finding(text: str, place: np.ndarray) -> Finding:
 
 
 def crossings(points: np.ndarray, triangles: np.ndarray, depth: float) -> np.ndarray:
-    """Return the places where edges of a surface pass through its triangles.
+    """Return the places where edges of a surface pass through its triangles, shape (k, 3), length.
 
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        depth: smallest distance of both ends of an edge from the plane of the triangle, length.
-
-    Returns:
-        Places, shape (k, 3), length.
+    depth: smallest distance of both ends of an edge from the plane of the triangle, length.
     """
     corners = points[triangles]
     low, high = corners.min(1), corners.max(1)

@@ -140,25 +140,13 @@ def surface(points: Any, triangles: Any, boundaries: Mapping[str, Any] | None = 
 
 
 def stl_grid(file: str | os.PathLike) -> Grid:
-    """Return the triangles of an STL file of a surface, with its open edges as boundaries (`surface`).
-
-    Args:
-        file: path of the file.
-
-    Raises:
-        InputError: the file cannot be read.
-    """
+    """Return the triangles of an STL file, with its open edges as boundaries (`surface`), or raise `InputError`."""
     points, triangles = read_stl(os.fspath(file_path("mesh.read: file", file)), "mesh.read")
     return Grid(points, np.arange(1, len(points) + 1), {"sheet": triangles}, open_edges(points, triangles))
 
 
 def open_edges(points: np.ndarray, triangles: np.ndarray) -> dict[str, np.ndarray]:
-    """Return {name: edges, shape (k, 2)} of the open edges of a surface, named as `surface` says.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-    """
+    """Return {name: edges, shape (k, 2)} of the open edges of a surface, named as `surface` says."""
     _, edges, _, times = edges_of(triangles)
     rest, found = edges[times == 1], {}
     used = points[np.unique(triangles)]
@@ -190,12 +178,9 @@ def _numbers(caller: str, elements: Any) -> tuple[Any, int]:
 
 
 def _grid(line: np.ndarray, columns: int, part: str) -> Grid:
-    """Return the triangles of a surface of revolution, counter-clockwise seen from outside.
+    """Return a surface of revolution from a meridian (r, z), neck first, shape (n, 2), length.
 
-    Args:
-        line: points (r, z) of the meridian, from the neck down, shape (n, 2), length.
-        columns: number of columns of triangles round the part.
-        part: "whole", "half" or "quarter".
+    Triangles are counter-clockwise from outside, in `columns` round the part "whole", "half" or "quarter".
     """
     start, sweep = _SWEEP[part]
     closed, whole = line[-1, 0] == 0, part == "whole"

@@ -18,14 +18,7 @@ _DEEP = 0.05               # depth of a mould under the held edge that is report
 
 @register("start")
 def moulds_off_the_held_edge(body: Any) -> Iterator[Finding]:
-    """Find moulds that lie below the held edge of a sheet, beside the sheet, or upside down.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each such mould.
-    """
+    """Yield a finding for each mould below the held edge of a sheet, beside the sheet, or upside down."""
     scene = body.scene
     held = _held_nodes(scene)
     if not len(held):
@@ -54,14 +47,7 @@ def moulds_off_the_held_edge(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def plugs_that_meet_the_held_edge(body: Any) -> Iterator[Finding]:
-    """Find tools that meet the held edge of a sheet in their travel; the edge cannot give way.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each such tool.
-    """
+    """Yield a finding for each tool that meets the held edge of a sheet in its travel; it cannot give way."""
     scene = body.scene
     held = _held_nodes(scene)
     travels = [abs(entry.value) for entry in body.prescribed if entry.quantity == "travel"]
@@ -91,12 +77,5 @@ def _held_nodes(scene: Any) -> np.ndarray:
 
 
 def _free(tool: Any, points: np.ndarray, ahead: float, length: float) -> np.ndarray:
-    """Return the distances of points from a tool along z, shape (n,), length; inf where there is no tool ahead.
-
-    Args:
-        tool: the tool.
-        points: positions, shape (n, 3), length.
-        ahead: z of the unit normal of the sheet towards the tool.
-        length: length scale of the sheet.
-    """
+    """Return the distances of points, shape (n, 3), from a tool along z, shape (n,), length, or inf."""
     return free_distance(tool, points, np.tile([0.0, 0.0, ahead], (len(points), 1)), 10 * length)

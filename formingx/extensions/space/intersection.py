@@ -24,10 +24,7 @@ class HalfSpace(SolidTool):
         self.axis, self.sign, self.position = axis, sign, position
 
     def _distance(self, x):
-        """Return the signed distances of points from the unmoved plane, positive inside, shape (n,), length.
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the signed distances from the unmoved plane, positive inside, shape (n,), length."""
         return self.sign * (x[:, self.axis] - self.position)
 
     def _distances(self, x):
@@ -90,10 +87,7 @@ class Intersection(SolidTool):
             np.minimum(a, b))
 
     def _distance(self, x):
-        """Return the signed distances of points from the unmoved tool, positive inside the tool, shape (n,), length.
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the signed distances from the unmoved tool, positive inside, shape (n,), length."""
         return self._combined(self.first.signed_distance(x), self.second.signed_distance(x))
 
     def _surface(self):

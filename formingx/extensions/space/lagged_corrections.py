@@ -33,20 +33,9 @@ class LaggedCorrections:
         return any([c.separate(new.x[:self._n], new.control) for c in self._contacts])
 
     def separate(self, curve: Curve, old: State, new: State, jump: Callable[[State], State]) -> State:
-        """Separate the points in tension from their tools, and solve again at the same control.
+        """Separate the points in tension from their tools, and solve for `new` again at the same control.
 
-        Args:
-            curve: solver of the path.
-            old: accepted state at the start of the step.
-            new: solved state at its end.
-            jump: function that returns the state after a snap-through from a given state, if the body snaps off its
-                tool.
-
-        Returns:
-            The state, without points in tension.
-
-        Raises:
-            Failure: no such state was found.
+        `jump` returns the state after a snap-through if the body snaps off its tool. Raise `Failure` without a state.
         """
         for _ in range(LAGGED.max_solutions):
             if not self._separates(new):
@@ -60,21 +49,9 @@ class LaggedCorrections:
     def close_penetrated(self, curve: Curve, old: State, new: State, equation: Constraint | None) -> State:
         """Put points that penetrate a tool into contact where they met it, and solve again for the end of a step.
 
-        At a target the points of all tools are considered, and contact pressures are renewed, so that without friction
-        the state does not depend on the steps before it. If the solution with renewed pressures fails, the solution
-        before it is returned. At other states only the points of tools with friction are considered.
-
-        Args:
-            curve: solver of the path.
-            old: accepted state at the start of the step.
-            new: solved state at its end.
-            equation: constraint of the target that `new` meets; None if it meets none. The control then stays.
-
-        Returns:
-            The state, in which no point penetrates a tool.
-
-        Raises:
-            Failure: no such state was found.
+        At a target (`equation`) all tools count and pressures are renewed, so that without friction the state does not
+        depend on earlier steps; if this fails, the solution before is returned. Elsewhere tools with friction count,
+        and the control stays. Raise `Failure` without a state.
         """
         constraint = equation or fixed(new.control)
         for sweep in range(LAGGED.max_solutions):
@@ -93,8 +70,5 @@ class LaggedCorrections:
         raise Failure("points that come into contact late bring others into their tool again and again", [])
 
     def renew(self, new: State) -> bool:
-        """Open points in tension, and replace stored contact pressures by those of a state at a target.
-
-        Return True if the state must be solved for again.
-        """
+        """Open points in tension, and store the pressures of a state at a target; True: solve for it again."""
         return self._separates(new) or any([c.renew_pressure(new.x[:self._n], new.control) for c in self._contacts])

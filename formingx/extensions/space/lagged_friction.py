@@ -78,61 +78,26 @@ class LaggedFriction(LaggedStick):
         self._pressure_ahead: tuple[ContactHistory, np.ndarray] | None = None
 
     def part(self, points: np.ndarray | slice) -> LaggedFriction:
-        """Return the contact law of some of the points.
-
-        Args:
-            points: numbers of the points, shape (m,), or a slice.
-
-        Returns:
-            Contact law of these points.
-        """
+        """Return the contact law of some of the points, numbers of shape (m,) or a slice."""
         return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
 
     def in_tension(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
-        """Return the mask of the points in contact that are in tension: the points outside the tool.
-
-        Args:
-            x: positions relative to the tool, shape (n, 3), length.
-            old: history variables of the last accepted state.
-
-        Returns:
-            Mask, shape (n,).
-        """
+        """Return the mask of the points in contact that lie outside the tool, shape (n,); x: shape (n, 3), length."""
         return self.in_contact(old) & (self.distance(x) < -NEGLIGIBLE * self.theta)
 
     def start(self, x: np.ndarray) -> ContactHistory:
-        """Return the history variables of points at the start of a run, without slip.
-
-        Args:
-            x: positions relative to the tool, shape (n, 3), length.
-
-        Returns:
-            History variables of the n points.
-        """
+        """Return the history variables of points at x, shape (n, 3), length, without slip."""
         return super().start(x)._replace(slip=np.zeros_like(x))
 
     def pressure(self, history: ContactHistory) -> np.ndarray:
-        """Return the contact pressure of an accepted state.
-
-        Args:
-            history: history variables of the state.
-
-        Returns:
-            Contact pressure of each point, shape (n,), stress; 0 for open points and in tension.
-        """
+        """Return the contact pressure of an accepted state, shape (n,), stress; 0 if open or in tension."""
         return np.asarray(self.k * np.maximum(history.distance, 0.0))
 
     def friction_pressure(self, old: ContactHistory) -> np.ndarray:
-        """Return the contact pressure N_0 that limits friction during the next step, in which it is constant.
+        """Return the contact pressure N_0 that limits friction during the next step, shape (n,), stress.
 
-        The positions `ContactHistory.closure` store it: N_0 is the penalty times their depth in the tool. It is at most
-        10 times larger or smaller than the pressure at the last accepted state.
-
-        Args:
-            old: history variables of the last accepted state.
-
-        Returns:
-            Pressure of each point, shape (n,), stress.
+        It is the penalty times the depth of `ContactHistory.closure`, at most 10 times larger or smaller than the
+        pressure at the last accepted state.
         """
         if self._pressure_ahead is None or self._pressure_ahead[0] is not old:
             now, change = np.maximum(old.distance, 0.0), old.closure - old.position
@@ -143,38 +108,19 @@ class LaggedFriction(LaggedStick):
         return self._pressure_ahead[1]
 
     def closure_at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
-        """Return the positions, to be stored as `ContactHistory.closure`, whose depth in the tool encodes a pressure.
-
-        Their depth is the pressure over the penalty, to first order. `friction_pressure` then limits friction by this
-        pressure.
-
-        Args:
-            old: history variables of the last accepted state.
-            pressure: pressure of each of the n points, shape (n,), stress.
-
-        Returns:
-            Positions relative to the tool, shape (n, 3), length.
-        """
+        """Return the positions, shape (n, 3), length, whose depth in the tool is a pressure over the penalty.
+        `friction_pressure` then limits friction by it; pressure: shape (n,), stress."""
         change = pressure / self.k - np.maximum(old.distance, 0.0)
         return np.asarray(old.position + change[:, None] * self.tool.distances(old.position).normal)
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the contact tractions at positions x, linearised at predicted positions.
+        """Compute the tractions at positions x, shape (n, 3), length, linearised at predicted positions.
 
-        A point that slid in the previous Newton iteration, and now slips in the opposite direction, sticks for one
-        iteration. Otherwise Newton's method would oscillate over the narrow range of elastic slip.
-
-        Args:
-            x: positions relative to the tool, shape (n, 3), length.
-            old: history variables of the last accepted state.
-            sense: direction of sliding in the previous iteration, shape (n,): angle in the tangent plane from the first
-                to the second vector of `_basis`, radians; 0 for a point that did not slide. None: first iteration.
-            expected: positions predicted by the previous iteration, with distances to first order; None: linearise at
-                x.
-
-        Returns:
-            Tractions per reference area, stress, with their stiffness and the new history variables.
+        sense: direction of sliding in the previous iteration, shape (n,), radians from the first to the second vector
+        of `_basis`; 0: none. A point whose slip reverses sticks for one iteration, else Newton's method would oscillate
+        over the narrow range of elastic slip. expected: positions and first-order distances from the previous
+        iteration; None: x.
         """
         assert old is not None
         positions, zero = x if expected is None else expected.position, np.zeros(len(x))
@@ -221,27 +167,14 @@ class LaggedFriction(LaggedStick):
         return found
 
     def contact_distances(self, x: np.ndarray, old: ContactHistory) -> tuple[np.ndarray, Distances]:
-        """Return the points in contact, and their distances from the tool with derivatives.
-
-        Args:
-            x: positions of all n points relative to the tool, shape (n, 3), length.
-            old: history variables of the last accepted state.
-
-        Returns:
-            Numbers of the m points in contact, shape (m,); their distances, normals and Hessians (`Distances`).
-        """
+        """Return the numbers of points in contact, shape (m,), and their `Distances`; x: shape (n, 3), length."""
         rows = np.flatnonzero(self.in_contact(old))
         return rows, self._distances(x[rows])
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
-        """Return distances and normals at x, from which the next Newton iteration predicts distances to first order.
+        """Return distances and normals at x, shape (n, 3), length, for a first-order prediction of distances.
 
-        Args:
-            x: positions relative to the tool, shape (n, 3), length.
-            old: history variables of the last accepted state.
-
-        Returns:
-            `Motion` with distances and normals of points in contact; 0 for open points. All slips are 0.
+        They are 0 for open points. All slips are 0.
         """
         assert old is not None
         d, n = np.zeros(len(x)), np.zeros_like(x)

@@ -88,14 +88,7 @@ class LaggedApproach(Approach):
         self.face.set_closures(places)
 
     def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """Return True if a new point is deeper in the tool than twice its tributary length.
-
-        Args:
-            old: locally owned unknowns at the start of the step, shape (n,).
-            old_control: control at the start of the step.
-            new: locally owned unknowns at its end, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-        """
+        """Return True if a new point is deeper in the tool than twice its tributary length; x: owned, shape (n,)."""
         face = self.face
         a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
@@ -108,8 +101,7 @@ class LaggedApproach(Approach):
         """Return True if an open point that does not stick enters the tool in a step, up to its other side.
 
         A point that sticks is held where it entered. Another one would be pushed out where it is nearest to the
-        surface, which must be the side on which it entered. old, old_control, new, control: locally owned unknowns and
-        load parameter at the start of the step and at its end.
+        surface, which must be the side on which it entered. old, new: owned unknowns, shape (n,).
         """
         face, law = self.face, self.face.law
         if face.contact.sticks or face.history is None:
@@ -130,11 +122,9 @@ class LaggedApproach(Approach):
         return PassedTool(self.face) if rule.surface.scene.mesh.flat else None
 
     def passed(self, fields: np.ndarray, control: float) -> PassedPoint | None:
-        """Return the point of the tool that passed the sheet farthest, or None if it passed less than is resolved.
+        """Return the point of the tool that passed the sheet farthest; None if less than is resolved.
 
-        Args:
-            fields: locally owned unknowns of the state, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
+        fields: owned unknowns, shape (n,).
         """
         if self._last is None or self._last[1] != control or not np.array_equal(self._last[0], fields):
             test = self._passed_tool
@@ -185,22 +175,15 @@ class LaggedApproach(Approach):
         return found
 
     def correct(self, fields: np.ndarray, control: float, at_target: bool, sweep: int) -> bool:
-        """Close points that penetrated the tool during a step, and renew the pressure that bounds friction.
-
-        At a target this applies to all tools, otherwise only to tools with friction. The contact pressure of this state
-        then bounds the friction of all points, in place of the pressure of the last accepted state.
-
-        fields, control: locally owned unknowns, shape (n,), and load parameter of the converged state. sweep: number of
-        earlier calls for this step. Return True if the state must be solved for again.
-        """
+        """Close points that penetrated the tool in a step, and renew friction's pressure; True: solve again.
+        Other states than targets need friction; sweep: number of earlier calls for this step."""
         late = (at_target or self.has_lagged_friction) and self._close_penetrated(fields, control)
         return (sweep < LAGGED.max_corrections and self.update_pressure(fields, control)) | late
 
     def _close_penetrated(self, fields: np.ndarray, control: float) -> bool:
-        """Close the gaps of open points that penetrate the tool more than is negligible; collective.
+        """Close the gaps of open points that penetrate the tool more than is negligible; True if any; collective.
 
-        Each such point sticks or slides from the position where its path in the step met the tool. Return True if
-        there are such points. fields, control: locally owned unknowns and load parameter of the state.
+        Each such point sticks or slides from the position where its path in the step met the tool.
         """
         face, variables = self.face, self.face.get()
         if variables is None:
@@ -223,27 +206,13 @@ class LaggedApproach(Approach):
         return bool(0 < self.face.law.mu < np.inf)
 
     def change_of_pressure(self, new: np.ndarray, control: float) -> float:
-        """Return the relative change of the contact pressure in a step with lagged friction.
-
-        Args:
-            new: locally owned unknowns at the end of the step, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            Change of the pressure since the last accepted state over the pressure there; 0 without lagged friction.
-        """
+        """Return the relative change of contact pressure in a step; 0 without lagged friction; new: shape (n,)."""
         return self._pressure_difference(self.face.tractions(new, control).normal) if self.has_lagged_friction else 0.0
 
     def update_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Replace the pressure that bounds lagged friction by the pressure at the end of the step.
+        """Replace the pressure that bounds lagged friction by that at the end of the step; new: shape (n,).
 
-        Args:
-            new: locally owned unknowns at the end of the step, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            True if the pressure was updated. False if both pressures agree to `LaggedLimits.max_pressure_difference`,
-            or friction is not lagged.
+        False if both agree to `LaggedLimits.max_pressure_difference`, or friction is not lagged.
         """
         if not self.has_lagged_friction:
             return False
@@ -255,18 +224,11 @@ class LaggedApproach(Approach):
         return True
 
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:
-        """Replace the contact pressure stored at the last accepted state by the pressure of a state at a target.
+        """Replace the stored contact pressure by that of a state at a target, owned unknowns, shape (n,).
 
-        On tools in three dimensions the stored pressure bounds the friction of a step. Where a sheet slides, the
-        tangential part of a fluid pressure also decreases with the stored pressure.
-
-        Args:
-            new: locally owned unknowns of the state, which meets a target of the run, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-
-        Returns:
-            True if the pressure was replaced. False if both agree to `LaggedLimits.max_target_difference` in the
-            area-weighted 1-norm, or if no pressure is stored for friction.
+        On tools in three dimensions it bounds friction in a step. Where a sheet slides, the tangential part of a fluid
+        pressure also decreases with it. False if both agree to `LaggedLimits.max_target_difference` in the
+        area-weighted 1-norm, or if no pressure is stored.
         """
         face, law, variables = self.face, self.face.law, self.face.get()
         if variables is None or face.contact.sticks:
@@ -282,18 +244,10 @@ class LaggedApproach(Approach):
         return True
 
     def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
-        """Return the arc length after which the contact pressure has changed by a given fraction.
+        """Return the arc length, at most `length`, in which the pressure changes by `LaggedLimits.max_pressure_change`.
 
-        The fraction is `LaggedLimits.max_pressure_change`. The pressure is extrapolated linearly from the last accepted
-        state. Lagged friction is bounded by the pressure at that state.
-
-        Args:
-            start: positions of the points relative to the tool, shape (n, c), length.
-            velocity: their derivatives by arc length, shape (n, c), length.
-            length: largest arc length.
-
-        Returns:
-            Arc length, at most `length`; `length` without lagged friction.
+        start, velocity: positions relative to the tool and d/ds, shape (n, c), length. The pressure is extrapolated
+        linearly; without lagged friction the result is `length`.
         """
         if not self.has_lagged_friction:
             return length
@@ -303,17 +257,10 @@ class LaggedApproach(Approach):
         return length * min(LAGGED.max_pressure_change / change, 1.0) if change else length
 
     def _pressure_difference(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
-        """Return the relative difference between two pressure fields in the area-weighted 1-norm.
+        """Return the relative difference of two pressures, shape (n,), stress, in the area-weighted 1-norm.
 
-        The difference is summed over the points that were under pressure at the last accepted state. It is divided by
-        the total normal force at that state plus a small force (`LaggedLimits.min_force`).
-
-        Args:
-            normal: normal tractions, shape (n,), stress; tension counts as 0.
-            other: pressure to compare with, shape (n,), stress; None: the pressure at the last accepted state.
-
-        Returns:
-            Relative difference over all ranks.
+        other: None for that of the last accepted state, whose points under pressure count. The sum is divided by their
+        force plus a small one (`LaggedLimits.min_force`).
         """
         face, before = self.face, self.face.law.pressure(self.face.history)
         difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))

@@ -59,41 +59,17 @@ class LaggedStick(ContactLaw):
         self._found: list[tuple[np.ndarray, np.ndarray]] = []           # distances asked for last, and where
 
     def part(self, points: np.ndarray | slice) -> LaggedStick:
-        """Return the contact law of some of the points.
-
-        Args:
-            points: numbers of the points, shape (m,), or a slice.
-
-        Returns:
-            Contact law of these points.
-        """
+        """Return the contact law of some of the points, numbers of shape (m,) or a slice."""
         return LaggedStick(self.tool, self.k, self.theta, self.separates)
 
     def in_contact(self, old: ContactHistory) -> np.ndarray:
-        """Return the mask of the points that are in contact during the next step.
-
-        Args:
-            old: history variables of the last accepted state.
-
-        Returns:
-            Mask, shape (n,).
-        """
+        """Return the mask of the points that are in contact during the next step, shape (n,)."""
         return old.distance > -self.theta
 
     def in_tension(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
-        """Return the mask of the sticking points in tension, which separate at the end of a step.
-
-        A point outside the tool is in tension if its distance from the tool exceeds two limits. One is 0.01 times its
-        distance from the position where it sticks. The other is 0.001 theta: theta is the distance from the tool below
-        which a point touches it. If sticking points cannot separate (`separates` is False), no point is in the mask.
-
-        Args:
-            x: positions relative to the tool, shape (n, 3), length.
-            old: history variables of the last accepted state.
-
-        Returns:
-            Mask, shape (n,).
-        """
+        """Return the mask of sticking points in tension, shape (n,), which separate at the end of a step.
+        They lie outside by over 0.01 times the way from their sticking position and 0.001 theta. None if `separates` is
+        False."""
         travel = np.linalg.norm(x - old.position, axis=1)
         limit = np.maximum(_TENSILE_DISTANCE * travel, NEGLIGIBLE * self.theta)
         return self.separates & self.in_contact(old) & (-self.distance(x) > limit)
@@ -102,15 +78,9 @@ class LaggedStick(ContactLaw):
         return np.zeros(len(x), dtype=bool) if old is None else self.in_contact(old)
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distances of points from the tool.
+        """Return the signed distances of points, shape (n, 3) or (m, n, 3), length, positive inside.
 
         The last three results are stored, and returned again for the same positions.
-
-        Args:
-            x: positions relative to the tool, shape (n, 3), or m positions of each point, shape (m, n, 3), length.
-
-        Returns:
-            Signed distances, positive inside the tool, shape (n,) or (m, n), length.
         """
         for positions, found in self._found:
             if np.array_equal(positions, x):
@@ -123,12 +93,8 @@ class LaggedStick(ContactLaw):
     def entries(self, a: np.ndarray, b: np.ndarray, ends: np.ndarray) -> np.ndarray:
         """Return where straight paths enter the tool, as shares of the paths, shape (n,); inf for paths outside it.
 
-        The distance from the tool is a safe advance along a path, so no thin part of the tool is passed over.
-
-        Args:
-            a: positions at the start, outside the tool, shape (n, 3), length.
-            b: positions at the end, shape (n, 3), length.
-            ends: mask of the paths that end in the tool or on it, shape (n,).
+        The distance from the tool is a safe advance along a path, so no thin part is passed over. a, b: start (outside
+        the tool) and end, shape (n, 3), length. ends: mask of paths that end in the tool or on it, shape (n,).
         """
         found: np.ndarray = np.where(ends, 1.0, np.inf)
         low: np.ndarray
@@ -160,14 +126,7 @@ class LaggedStick(ContactLaw):
         return found
 
     def start(self, x: np.ndarray) -> ContactHistory:
-        """Return the history variables of points at the start of a run; points inside the tool stick where they are.
-
-        Args:
-            x: positions relative to the tool, shape (n, 3), length.
-
-        Returns:
-            History variables of the n points.
-        """
+        """Return the history variables at x, shape (n, 3), length; points inside the tool stick there."""
         d = self.distance(x)
         sticking = d > -self.theta
         return ContactHistory(x.copy(), np.where(sticking, 0.0, d), np.zeros(len(x)), x.copy())
@@ -176,17 +135,8 @@ class LaggedStick(ContactLaw):
                   expected: Motion | None = None) -> Tractions:
         """Compute the tractions k (x - x_0) of sticking points with the penalty k; 0 for open points.
 
-        The sticking position x_0 is where the point crossed the tool. The law computes no normals: `Tractions.normal`
-        is 1 for a sticking point and 0 for an open one, not a stress.
-
-        Args:
-            x: positions relative to the tool, shape (n, 3), length.
-            old: history variables of the last accepted state; not None.
-            sense: not used.
-            expected: not used.
-
-        Returns:
-            Tractions with their stiffness and the new history variables.
+        x: shape (n, 3), length. x_0 is where the point crossed the tool. The law computes no normals:
+        `Tractions.normal` is 1 for a sticking point and 0 for an open one, not a stress.
         """
         assert old is not None
         sticking, zero, force = self.in_contact(old), np.zeros(len(x)), np.zeros_like(x)
@@ -200,14 +150,10 @@ class LaggedStick(ContactLaw):
         return Tractions(force, sticking.astype(float), zero, zero, stiffness, lambda: self._history(x, old, sticking))
 
     def _history(self, x: np.ndarray, old: ContactHistory, sticking: np.ndarray) -> ContactHistory:
-        """Return the history variables that the points have once the state at x is accepted.
+        """Return the history variables after the state at x, shape (n, 3), length, is accepted.
 
-        A point whose gap closed in the step sticks where its straight path from the state before enters the tool.
-
-        Args:
-            x: positions relative to the tool, shape (n, 3), length.
-            old: history variables of the state before.
-            sticking: mask of the points that stick already, shape (n,).
+        A point whose gap closed in the step sticks where its straight path enters the tool. sticking: mask of the
+        points that stick already, shape (n,).
         """
         d = self.distance(x)
         share = np.where(sticking, np.inf, self.entries(old.position, x, d > -self.theta))

@@ -18,16 +18,10 @@ _INSIDE = 0.01             # distance of a held edge inside the mouth of a mould
 
 @register("start")
 def sizes(body: Any) -> Iterator[Finding]:
-    """Find fixed tools that are more than 4 times wider or narrower than the sheet, as in another unit of length.
+    """Yield a finding for each fixed tool over 4 times wider or narrower than the sheet, as in another unit.
 
     A wide tool from an STL file is always reported. The flange of a swept profile is arbitrary, so a wide one is
-    reported if the sheet is farther from it than the sheet is wide. A narrow tool is reported if it is a cavity.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each such tool.
+    reported if it is farther from the sheet than this is wide. A narrow tool is reported if it is a cavity.
     """
     for contact in fixed_tools(body.scene):
         tool, sheet = contact.tool, whole_extent(body.scene)
@@ -45,14 +39,7 @@ def sizes(body: Any) -> Iterator[Finding]:
 
 @register("scene")
 def narrow_sheets(body: Any) -> Iterator[Finding]:
-    """Find sheets whose edge lies inside the mouth of a mould, farther than 1 % of their width from its wall.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each such mould.
-    """
+    """Yield a finding for each mould in whose mouth a sheet ends, farther than 1 % of its width from the wall."""
     scene = body.scene
     for contact in moulds(scene) if scene.kinematics.components == 3 and scene.mesh.flat else ():
         tool = contact.tool
@@ -68,16 +55,10 @@ def narrow_sheets(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def narrow_moulds(body: Any) -> Iterator[Finding]:
-    """Find moulds past whose end a sheet hangs, if a pressure of the run is more than the overhang bears alone.
+    """Yield a finding for a face of the sheet with moulds past whose end it hangs, if a pressure is too large for it.
 
-    The overhang bears about as much as a disc. The radius of the disc is the largest distance of a node without a tool
-    straight ahead from the nodes with one, and from the edges that are held.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each face of the sheet with such moulds.
+    The overhang bears about as much as a disc. Its radius is the largest distance of a node without a tool straight
+    ahead from nodes with one, and from the edges that are held.
     """
     scene = body.scene
     pressures = body.pressures() if scene.kinematics.components == 3 else []
@@ -132,10 +113,7 @@ def nodes_and_direction(scene: Any, contact: Contact) -> tuple[np.ndarray, float
 
 
 def _distances_at_mouth(tool: Any, points: np.ndarray, ahead: float) -> np.ndarray:
-    """Return the distances of points from a tool after a shift along z to its end next to the sheet, (n,), length.
-
-    `points` have the shape (n, 3), length; `ahead` is the z of the unit normal of the sheet towards the tool.
-    """
+    """Return the distances of points, shape (n, 3), moved along z to the tool's end next to the sheet, shape (n,)."""
     mouth = tool.bounds[0 if ahead > 0 else 1, 2]
     return -tool.signed_distance(np.column_stack([points[:, :2], np.full(len(points), mouth)]))
 

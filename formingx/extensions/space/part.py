@@ -75,24 +75,11 @@ class SheetPart(PartNumbers):
 
 def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units: Units,
          planes: MirrorPlanes) -> SheetPart:
-    """Return the numbers of the formed part in a state.
+    """Return the numbers of the whole formed part, from the wall of the sheet in a state and its mirror planes.
 
-    Args:
-        wall: wall of the sheet in the state.
-        density: density in g/cm3, or None.
-        trim: z of the plane at which the formed sheet is cut, length; the part is the side away from the flat sheet, or
-            the upper side of a surface that is not flat, such as a bottle above its flash. Or an outline in the plane
-            of x and y, as that of `fx.mesh.sheet`; the part is inside it. None: no cut.
-        heights: must be empty, since `SheetWall.section` gives the wall along a cut.
-        units: units of the labels.
-        planes: mirror planes at which the modelled body ends.
-
-    Returns:
-        Numbers of the whole part.
-
-    Raises:
-        InputError: heights are given, the plane or outline of `trim` does not meet the part, or the density is not
-            positive.
+    trim: z of a plane, length, whose side away from the flat sheet is the part (the upper side of another surface), or
+    an outline around it. heights must be empty: `SheetWall.section` gives cuts. density: g/cm3. Raise `InputError` for
+    heights, for a trim that does not meet the part, or for a density that is not positive.
     """
     if len(tuple(heights)):
         raise InputError("part: heights: in three dimensions use path.wall().section(point, normal)")
@@ -122,12 +109,7 @@ def _capacity(wall: SheetWall, trim: Any) -> float | None:
 def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
     """Return the share of the area of each triangle that remains after trimming, shape (m,).
 
-    Args:
-        wall: wall of the sheet.
-        trim: z of a plane, length, or an outline in the plane of x and y.
-
-    Raises:
-        InputError: the plane or the outline does not meet the part.
+    trim: z of a plane, length, or an outline (x, y). Raise `InputError` if it does not meet the part.
     """
     points = wall.deformed_points
     if not isinstance(trim, list | tuple | np.ndarray):
@@ -147,11 +129,9 @@ def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
 
 
 def _depth_in_polygon(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return the distances of points from the boundary of a polygon, positive inside, shape (n,), length.
+    """Return the distances of points, shape (n, 2), from a polygon, positive inside, shape (n,), length.
 
-    Args:
-        points: positions (x, y), shape (n, 2), length.
-        corners: corners of the polygon, shape (k, 2), length.
+    corners: shape (k, 2), length.
     """
     inside, nearest = np.zeros(len(points), dtype=bool), np.full(len(points), np.inf)
     for a, b in zip(corners, np.roll(corners, -1, axis=0)):
@@ -165,11 +145,7 @@ def _depth_in_polygon(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 def _positive_share(d: np.ndarray) -> np.ndarray:
-    """Return the share of the area of each of m triangles on which a linear field is positive, shape (m,).
-
-    Args:
-        d: values of the field at the corners of the triangles, shape (m, 3).
-    """
+    """Return the share of each of m triangles on which a linear field, shape (m, 3), is positive, shape (m,)."""
     alone = np.argmax((d > 0) == ((d > 0).sum(1) == 1)[:, None], axis=1)       # the corner that is on its own side
     a, b, c = (np.take_along_axis(d, (alone[:, None] + k) % 3, 1)[:, 0] for k in range(3))
     with np.errstate(divide="ignore", invalid="ignore"):
@@ -213,13 +189,7 @@ class SheetFilling(ColumnTable):
 def filling(path: Any, contact: Any) -> SheetFilling:
     """Return the filling of a tool by the sheet in all states of a run; collective.
 
-    Args:
-        path: the computed `Path`.
-        contact: contact of the sheet with the tool, a `FaceContact`.
-
-    Returns:
-        In each state the share of the sheet's area that touches the tool, and the largest distance of the sheet from
-        the tool.
+    In each state: the share of the sheet's area that touches the tool, and the largest distance from it.
     """
     rows, comm = [], path.problem.comm
     tool = contact.contact.tool

@@ -79,10 +79,8 @@ class PassedTool:
     def deepest(self, fields: np.ndarray, control: float, negligible: float) -> PassedPoint | None:
         """Return the point of the tool that passed the sheet farthest, or None; collective.
 
-        Args:
-            fields: locally owned unknowns of the state, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-            negligible: distance from the nearest node, over the median edge, up to which a point is not examined.
+        fields: owned unknowns, shape (n,). negligible: distance from the nearest node, over the median edge, up to
+        which a point is not examined.
         """
         face, x = self._face, self._points
         P = self._placed(face.positions(fields, control))
@@ -124,12 +122,9 @@ class PassedTool:
 
 
 def _outer_nodes(cells: np.ndarray, X: np.ndarray, planes: tuple[Any, ...]) -> np.ndarray:
-    """Return the nodes at the edge of a sheet without its cuts at planes of symmetry, shape (k,).
+    """Return the nodes at the edge of a sheet, without its cuts at planes of symmetry, shape (k,).
 
-    Args:
-        cells: node numbers of the triangles, shape (m, 3).
-        X: reference positions of the nodes, shape (n, 3), length.
-        planes: mirror planes.
+    cells: shape (m, 3). X: reference positions, shape (n, 3), length.
     """
     _, edges, _, times = edges_of(cells)
     outer = edges[times == 1]
@@ -140,16 +135,10 @@ def _outer_nodes(cells: np.ndarray, X: np.ndarray, planes: tuple[Any, ...]) -> n
 
 
 def surface_points(tool: Any, spacing: float, nodes: np.ndarray, margin: float) -> np.ndarray:
-    """Return points on the surface of a tool over the sheet, shape (n, 3), length.
+    """Return points on the surface of a tool over the sheet and a strip of width `margin`, shape (n, 3), length.
 
-    Triangles of the drawn surface are divided to the spacing, and the points are moved onto the tool. Points that lie
-    inside another part of the tool are left out.
-
-    Args:
-        tool: the tool, with `distances` and `surface`.
-        spacing: largest distance of neighbouring points, length.
-        nodes: positions of the nodes of the flat sheet, shape (m, 3), length.
-        margin: width of the strip round the sheet in which points are found, too, length.
+    Drawn triangles are divided to `spacing`, and the points moved onto the tool, without those inside another part.
+    nodes: of the flat sheet, shape (m, 3), length.
     """
     points, triangles = tool.surface()
     low, high = nodes[:, :2].min(0) - margin, nodes[:, :2].max(0) + margin

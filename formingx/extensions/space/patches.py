@@ -31,12 +31,7 @@ def unit(vectors: np.ndarray) -> np.ndarray:
 
 
 def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return twice the area vectors of triangles, shape (m, 3), length^2.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-    """
+    """Return twice the area vectors of triangles, shape (m, 3), length^2."""
     a, b, c = (points[triangles[:, k]] for k in range(3))
     return np.asarray(np.cross(b - a, c - a))
 
@@ -44,10 +39,7 @@ def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 def sides_of_edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the two sides of each edge of exactly two triangles, shape (k,) each.
 
-    Side k m + t is the edge of triangle t from its corner k to the next corner, among m triangles.
-
-    Args:
-        triangles: vertex numbers, shape (m, 3).
+    Side k m + t is the edge of triangle t (of m) from its corner k to the next.
     """
     _, _, number, times = edges_of(triangles)
     order, starts = np.argsort(number, kind="stable"), np.concatenate([[0], np.cumsum(times)])
@@ -87,32 +79,21 @@ class PatchSurface:
         self._nodes, self._links = nodes[:used].copy(), links[:used].copy()
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distances of points from the surface, positive inside, shape (n,), length.
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the signed distances of points, shape (n, 3), positive inside, shape (n,), length."""
         return self._nearest(x, False)[0].distance
 
     def distances(self, x: np.ndarray) -> Distances:
-        """Return the signed distances of points, with first and second derivatives.
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the signed distances of points, shape (n, 3), length, with first and second derivatives."""
         return self._nearest(x, True)[0]
 
     def nearest_triangles(self, x: np.ndarray) -> np.ndarray:
-        """Return the numbers of the triangles whose patches are nearest to points, shape (n,).
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the numbers of the triangles whose patches are nearest to points, shape (n,)."""
         return self._nearest(x, False)[1]
 
     def positions(self, triangles: np.ndarray, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return points of the surface and its unit normals there, out of the tool, shape (n, 3) each.
+        """Return points of the surface and its unit normals, out of the tool, shape (n, 3) each.
 
-        Args:
-            triangles: numbers of the triangles, shape (n,).
-            coordinates: barycentric coordinates with respect to the first two corners, shape (n, 2).
+        coordinates: barycentric, for the first two corners, shape (n, 2).
         """
         out, triangles = np.empty((len(triangles), 6, 3)), np.ascontiguousarray(triangles, dtype=int)
         compiled().evaluate(len(triangles), address_of_integers(triangles), address(self.patches), address(coordinates),
@@ -120,11 +101,9 @@ class PatchSurface:
         return out[:, 0], unit(np.cross(out[:, 1], out[:, 2]))
 
     def _nearest(self, x: np.ndarray, derivatives: bool) -> tuple[Distances, np.ndarray]:
-        """Return the distances of points from the surface, and the numbers of the nearest triangles, shape (n,).
+        """Return the distances of points, shape (n, 3), length, and the nearest triangles, shape (n,).
 
-        Args:
-            x: positions, shape (n, 3), length.
-            derivatives: False to leave normals and Hessians empty.
+        derivatives: False to leave normals and Hessians empty.
         """
         n = len(x)
         d, normal, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
@@ -140,11 +119,7 @@ class PatchSurface:
 def _neighbours(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return the normals of the neighbour across each edge at the two ends of the edge, shape (m, 3, 2, 3).
 
-    At an edge that does not belong to exactly two triangles, the normals are those of the triangle itself.
-
-    Args:
-        triangles: vertex numbers, shape (m, 3).
-        normals: unit normals at the corners, shape (m, 3, 3).
+    Without exactly two triangles at an edge, they are those of the triangle itself.
     """
     m = len(triangles)
     other = np.stack([np.stack([normals[:, k], normals[:, (k + 1) % 3]], 1) for k in range(3)], 1)
@@ -156,11 +131,7 @@ def _neighbours(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 def _bulges(patches: np.ndarray, facet: np.ndarray) -> np.ndarray:
-    """Return the largest distance of the control points of each patch from its flat triangle or edges, (m,), length.
-
-    Args:
-        patches: control points, shape (m, 18, 3), length.
-        facet: unit normals of the flat triangles, shape (m, 3).
+    """Return the largest distance of the control points, shape (m, 18, 3), from flat triangles or edges, (m,), length.
     """
     corners = patches[:, [0, 4, 8]]
     chord = np.roll(corners, -1, 1) - corners
@@ -174,12 +145,7 @@ def _bulges(patches: np.ndarray, facet: np.ndarray) -> np.ndarray:
 def _end_tangent(chord: np.ndarray, normal: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the direction of the boundary curve at an end of each of m edges, shape (m, 3).
 
-    It lies in the tangent plane, along a crease in both tangent planes.
-
-    Args:
-        chord: vectors from the first to the last point of the edges, shape (m, 3), length.
-        normal: unit normals of the patch at the end, shape (m, 3).
-        other: unit normals of the neighbour there, shape (m, 3).
+    It lies in the tangent plane, along a crease in that of the neighbour too. chord: length.
     """
     inside = unit(chord - (chord * normal).sum(1, keepdims=True) * normal)
     along = np.cross(normal, other)
@@ -189,16 +155,11 @@ def _end_tangent(chord: np.ndarray, normal: np.ndarray, other: np.ndarray) -> np
 
 
 def control_points(corners: np.ndarray, normals: np.ndarray, other: np.ndarray) -> np.ndarray:
-    """Return the control points of patches, shape (m, 18, 3), length.
+    """Return the control points of patches, shape (m, 18, 3), length; corners, normals: shape (m, 3, 3).
 
-    Rows 4 k to 4 k + 3 lie on the boundary curve from corner k. Rows 12 + 2 k and 13 + 2 k are the two inner control
-    points near corner k, the first for the edge from k to k + 1, the second for the edge that ends in k.
-
-    Args:
-        corners: corners of the triangles, shape (m, 3, 3), length.
-        normals: unit normals at the corners, shape (m, 3, 3).
-        other: unit normals of the neighbour across edge k at its two ends, shape (m, 3, 2, 3); equal to `normals` at
-            smooth edges.
+    Rows 4 k to 4 k + 3 lie on the boundary curve from corner k. Rows 12 + 2 k and 13 + 2 k are the two inner ones near
+    corner k, the first for the edge from k to k + 1, the second for the edge that ends in k. other: normals of the
+    neighbour across edge k at its two ends, shape (m, 3, 2, 3), equal to `normals` at smooth edges.
     """
     m = len(corners)
     P, curve, leg = np.zeros((m, 18, 3)), np.zeros((m, 3, 5, 3)), np.zeros((m, 3, 3, 3))

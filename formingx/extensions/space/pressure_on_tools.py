@@ -46,14 +46,9 @@ class PressureOnTools:
             fem.Function(surface.space) for _ in range(6))
 
     def work(self, value: Any, area: Any) -> Any:
-        """Return the virtual work of the tangential part of a pressure, to be subtracted from the residual.
+        """Return the virtual work (UFL) of the tangential part of a pressure, to be subtracted from the residual.
 
-        Args:
-            value: applied pressure (UFL scalar, stress).
-            area: deformed area vector per unit reference area (UFL, shape (3,)).
-
-        Returns:
-            Virtual work (UFL linear form).
+        area: deformed area vector per unit reference area (UFL, shape (3,)).
         """
         surface, v = self._surface, self._surface.test_displacement()
         sliding, displacement, normal, *hessian = (ufl.split(f)[0] for f in (

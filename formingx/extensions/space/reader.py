@@ -30,78 +30,27 @@ class SheetReader:
         self._path = path
 
     def wall(self, state: State) -> SheetWall:
-        """Return the wall thickness of each triangle in a state; collective.
-
-        Args:
-            state: a `State` of the path.
-
-        Returns:
-            Wall of the sheet with the reference and deformed positions of its nodes.
-        """
+        """Return the wall thickness of each triangle in a state; collective."""
         return wall_of(self._path, state)
 
     def part(self, state: State, density: float | None, trim: Any, heights: Any, units: Units) -> SheetPart:
-        """Return numbers of the whole formed part in a state: volume, walls, weight; collective.
-
-        Args:
-            state: a `State` of the path.
-            density: density in g/cm3, or None.
-            trim: z of the plane at which the sheet is cut, length, or None.
-            heights: must be empty in three dimensions.
-            units: units of the labels.
-
-        Returns:
-            Numbers of the part.
-        """
+        """Return numbers of the whole formed part in a state (`part.part`); collective."""
         return parts.part(self.wall(state), density, trim, heights, units, self._path.scene.symmetry)
 
     def filling(self, contact: FaceContact) -> SheetFilling:
-        """Return the filling of a tool by the sheet in all states; collective.
-
-        Args:
-            contact: contact of the sheet with the tool.
-
-        Returns:
-            The filling in each state.
-        """
+        """Return the filling of a tool by the sheet in all states; collective."""
         return parts.filling(self._path, contact)
 
     def view(self, file: Any, state: State, grid: float | None) -> None:
-        """Draw the whole part in a state as PNG, coloured by its wall thickness (rank 0 draws).
-
-        Args:
-            file: path of the PNG file.
-            state: a `State` of the path.
-            grid: size of the squares of a grid that is printed on the flat sheet, length; None: no grid.
-        """
+        """Draw the whole part in a state as PNG, coloured by its wall thickness (rank 0 draws)."""
         show.view(self._path, state, file, grid)
 
     def solid(self, state: State) -> tuple:
-        """Return the closed surface of the whole part in a state, whose two sides are a wall thickness apart.
-
-        Args:
-            state: a `State` of the path.
-
-        Returns:
-            Points, shape (n, 3), length; triangles that look outward, shape (m, 3); deformed over reference wall
-            thickness at the points, shape (n,).
-        """
+        """Return points, triangles and wall ratios of the part as a closed surface (`show.solid`)."""
         return show.solid(self._path, state)
 
     def report(self, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-        """Write the report of the run as an HTML page (rank 0 writes).
-
-        Args:
-            file: path of the HTML file.
-            title: heading of the page.
-            failure: the error that ended the run, or None.
-            units: units of the labels.
-            density: density in g/cm3, or None.
-            trim: z of the plane at which the sheet is cut, length, or None.
-
-        Returns:
-            Path of the file.
-        """
+        """Write the report of the run as an HTML page, and return its path (rank 0 writes)."""
         return show.report(self._path, file, title, failure, units, density, trim)
 
 

@@ -24,18 +24,10 @@ The sheet may be a quarter of the whole.
 
 
 def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
-    """Return the reference thickness of each layer of a sheet as a function of position; collective.
+    """Return {layer: reference thickness as a function of arrays (x, y, z)}, positive at all nodes; collective.
 
-    Args:
-        scene: the `Scene`.
-        given: the argument `thickness` of the scene: a length, a function of arrays (x, y) or (x, y, z) that returns
-            lengths, or {layer: length or function}.
-
-    Returns:
-        {layer: function of arrays (x, y, z)}, positive at all nodes.
-
-    Raises:
-        InputError: the mesh is no `SurfaceMesh`, a layer has no thickness, or a thickness is not positive.
+    given: a length, a function of arrays (x, y) or (x, y, z), or {layer: one of these}. Raise `InputError` if the mesh
+    is no `SurfaceMesh`, a layer has no thickness, or a thickness is not positive.
     """
     mesh = scene.mesh
     if not isinstance(mesh, SurfaceMesh):
@@ -85,13 +77,7 @@ class _OfPosition:
 
 
 def _check(name: str, function: _OfPosition, X: np.ndarray) -> None:
-    """Raise an InputError unless the thickness of a layer is positive at all nodes.
-
-    Args:
-        name: name of the layer.
-        function: thickness of the layer.
-        X: reference positions of the nodes, shape (n, 3), length.
-    """
+    """Raise an `InputError` unless the thickness of a layer is positive at all nodes X, shape (n, 3), length."""
     places = arguments(function.function, dict(zip("xyz", X.T)))
     found = values(f"Scene: thickness of {name!r}", function.function, places)
     if len(found) and found.min() <= 0:
@@ -101,15 +87,10 @@ def _check(name: str, function: _OfPosition, X: np.ndarray) -> None:
 
 
 def refuse(scene: Any, heat: Any) -> None:
-    """Raise an InputError for parts of a scene that are not available in three dimensions.
+    """Raise an `InputError` for parts of a scene that are not available in three dimensions.
 
-    Args:
-        scene: the `Scene`.
-        heat: the heat conduction of the scene, or None.
-
-    Raises:
-        InputError: a model other than a membrane, heat conduction, a centrifugal load, a pressure on an edge, a
-            pinned node, or a `Symmetry` of an edge that does not lie in a plane normal to its axis.
+    They are a model other than a membrane, heat conduction, a centrifugal load, a pressure on an edge, a pinned node,
+    and a `Symmetry` of an edge that does not lie in a plane normal to its axis.
     """
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in three dimensions is a Membrane(): solids in three"
@@ -150,13 +131,8 @@ def _check_plane(scene: Any, support: Symmetry) -> None:
 def check_contact(scene: Any, contact: Any) -> None:
     """Check a contact of a sheet: its options, the size of its tool, and that the sheet starts outside it; collective.
 
-    Args:
-        scene: the `Scene` of the sheet.
-        contact: a `Contact` of the scene.
-
-    Raises:
-        InputError: an option that is not available in three dimensions, sizes that indicate different units of length,
-            or a sheet that starts inside the tool.
+    Raise `InputError` for options that three dimensions do not have, for sizes in different units of length, and for a
+    sheet inside the tool.
     """
     mesh, tool = scene.mesh, contact.tool
     if contact.on not in mesh.faces:

@@ -165,14 +165,9 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
 
 
 def outline_edges(outline: Any, caller: str) -> list[Edge]:
-    """Return the pieces of an outline that is given by pieces or by the corners (x, y) of a polygon.
+    """Return the pieces of an outline, given by pieces or by the corners (x, y) of a polygon, length.
 
-    Args:
-        outline: pieces, as those of `rectangle`, or corners, length.
-        caller: name of the caller and of its argument, for messages.
-
-    Raises:
-        InputError: it is neither, or has fewer than three corners.
+    Raise `InputError` for another form, or for fewer than three corners.
     """
     edges = as_list(caller, outline, "corners (x, y), or what fx.mesh.rectangle gives")
     if all(isinstance(edge, Edge) for edge in edges):
@@ -186,13 +181,8 @@ def outline_edges(outline: Any, caller: str) -> list[Edge]:
 def chords(edges: list[Edge], caller: str) -> np.ndarray:
     """Return the corners of an outline with each arc divided into 8 chords, shape (n, 2), length.
 
-    Args:
-        edges: straight and curved pieces of the outline, in order.
-        caller: name of the caller and of its argument, for messages.
-
-    Raises:
-        InputError: two equal corners in succession, or an outline that crosses or touches itself, for which gmsh might
-            not end.
+    Raise `InputError` for two equal corners in succession, or for an outline that crosses or touches itself, for which
+    gmsh might not end.
     """
     points = []
     for edge in edges:
@@ -247,12 +237,9 @@ class _Size:
             return 1e22
 
     def area_and_size(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Divide a polygon into m pieces; return their areas and the edge lengths of triangles there, shape (m,) each.
+        """Divide a polygon, shape (n, 2), into m equal areas; return them and the edge lengths there, shape (m,) each.
 
-        All pieces have the same area. With a constant edge length there is one piece.
-
-        Args:
-            x: corners of the polygon, shape (n, 2), length.
+        With a constant edge length there is one piece.
         """
         y = np.roll(x, -1, axis=0)
         area = abs(np.sum(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])) / 2
@@ -269,12 +256,7 @@ class _Size:
 
 
 def _grid(edges: list[Edge], size: _Size) -> Grid:
-    """Mesh the inside of an outline with triangles, by gmsh on one rank.
-
-    Args:
-        edges: pieces of the outline, in order.
-        size: edge length of the triangles.
-    """
+    """Mesh the inside of an outline with triangles of a given edge length, by gmsh on one rank."""
     options = {"General.NumThreads": 1.0, "Mesh.MeshSizeExtendFromBoundary": 0.0}
     if size.constant:
         options |= {"Mesh.MeshSizeMin": size.constant, "Mesh.MeshSizeMax": size.constant}
@@ -320,14 +302,9 @@ def _grid(edges: list[Edge], size: _Size) -> Grid:
 
 
 def _reflected(grid: Grid, name: str) -> Grid:
-    """Return the mesh of a sheet joined with its mirror image about a straight boundary.
+    """Return the mesh of a sheet joined with its mirror image about a straight boundary, which disappears.
 
-    Args:
-        grid: triangles of the sheet.
-        name: name of the boundary, which the result does not have.
-
-    Raises:
-        InputError: the boundary is not straight, or its straight extension crosses or touches the sheet.
+    Raise `InputError` if it is not straight, or if its straight extension crosses or touches the sheet.
     """
     X, (sheet,) = grid.points, grid.layers.values()
     line = np.unique(grid.boundaries[name])

@@ -30,16 +30,9 @@ _LARGEST_TOOL = _DRAWN // _FRAMES[0]
 
 
 def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
-    """Draw the whole part in a state as PNG, completed by mirror images and coloured by wall thickness (rank 0 draws).
+    """Draw the whole part as PNG, completed by mirror images and coloured by wall thickness (rank 0 draws).
 
-    Args:
-        path: the computed `Path`.
-        state: a `State` of the path.
-        file: path of the PNG file.
-        grid: size of the squares of a grid that is printed on the flat sheet, length; None: no grid.
-
-    Raises:
-        InputError: neither a screen nor Xvfb is available.
+    grid: size of the squares of a grid printed on the flat sheet, length. Raise `InputError` without screen and Xvfb.
     """
     file, wall = files.named("view3d", file, ".png"), wall_of(path, state)
     lines = wall.printed(grid) if grid else []
@@ -73,16 +66,9 @@ _LARGEST_MITRE = 3.0
 def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the closed surface of the whole part in a state, completed by mirror images.
 
-    Half of the wall thickness lies on each side of the mid-surface. Nodes are moved along their normals, at folds by
-    so much more that the volume is that of the walls.
-
-    Args:
-        path: the computed `Path`.
-        state: a `State` of the path.
-
-    Returns:
-        Points, shape (n, 3), length; triangles that look outward, shape (m, 3); deformed over reference wall thickness
-        at the points, shape (n,).
+    Points, shape (n, 3), length; triangles, outward, shape (m, 3); wall over reference wall there, shape (n,). Half of
+    the wall lies on each side of the mid-surface. Nodes are moved along their normals, at folds by so much more that
+    the volume is that of the walls.
     """
     wall, planes = wall_of(path, state), path.scene.symmetry
     on = [np.abs(wall.reference_points[:, plane.axis] - plane.position) < planes.near for plane in planes.planes]
@@ -119,11 +105,6 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
 
     Each triangle is an S3 element whose section thickness is its deformed wall thickness. The user adds the material
     POLYMER, and constrains a half or a quarter at its planes of symmetry.
-
-    Args:
-        path: the computed `Path`.
-        file: path of the file, ending in .inp.
-        state: a state of the path; default the last.
     """
     file, wall = files.named("shell_model", file, ".inp"), wall_of(path, state or path.last)
 
@@ -139,19 +120,9 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
 
 
 def report(path: Any, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-    """Write the report of a run in three dimensions as an HTML page (rank 0 writes).
+    """Write the report of a run in three dimensions as an HTML page, and return its path (rank 0 writes).
 
-    Args:
-        path: the computed `Path`.
-        file: path of the HTML file.
-        title: heading of the page.
-        failure: the error that ended the run, or None.
-        units: units of the labels.
-        density: density in g/cm3, or None.
-        trim: z of the plane at which the sheet is cut, length, or None.
-
-    Returns:
-        Path of the file.
+    density: g/cm3, or None. trim: z of the plane at which the sheet is cut, length, or None.
     """
     from .part import part
     wall, last, comm = path.wall(), path.last, path.problem.comm
@@ -195,12 +166,9 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
 
 
 def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
-    """Return the data that the script `report.js` of a report draws: the sheet in each drawn state, and the tools.
+    """Return the data that `report.js` draws: the sheet in each drawn state, and the tools.
 
-    Args:
-        path: the computed `Path`.
-        record: record of the path, with the numbers of the drawn states and the travels of the tools.
-        units: units of the labels.
+    record: numbers of the drawn states and travels of the tools.
     """
     walls = [wall_of(path, path.states[k]) for k in record.frames]
     ratio = [wall.to_nodes(wall.ratio) for wall in walls]

@@ -102,15 +102,9 @@ class SolidTool:
         return found
 
     def contact_law(self, contact: Contact, k: np.ndarray | float, thickness: float) -> ContactLaw:
-        """Return the contact law of a sheet on this tool.
+        """Return the law of a sheet of a given thickness, length: `LaggedStick`, or `LaggedFriction` if it slides.
 
-        Args:
-            contact: the `Contact`, with its friction and regularisation.
-            k: penalty, stress/length, the same number at all points.
-            thickness: thickness of the sheet, length, which scales the regularisation.
-
-        Returns:
-            `LaggedStick`, or `LaggedFriction` if the contact does not stick.
+        k: penalty, stress/length, the same at all points; the thickness scales the regularisation.
         """
         theta = contact.ramp * thickness
         if contact.sticks:
@@ -118,10 +112,7 @@ class SolidTool:
         return LaggedFriction(self, contact.mu, k, theta, contact.elastic_slip * thickness)
 
     def _distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distances of points from the unmoved tool, positive inside the tool, shape (n,), length.
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the signed distances from the unmoved tool, positive inside, shape (n,), length."""
         raise NotImplementedError
 
     def _distances(self, x: np.ndarray) -> Distances:
@@ -134,12 +125,9 @@ class SolidTool:
 
 
 def nearest_of(parts: list[Distances]) -> Distances:
-    """Return the distances of points from the union of several solids.
+    """Return the distances of n points from the union of several solids, positive inside.
 
-    Positive distances are inside. The largest distance from a solid is the distance from the union, exactly outside.
-
-    Args:
-        parts: distances of the same n points from each solid.
+    It is the largest distance from a solid, exact outside.
     """
     if len(parts) == 1:
         return parts[0]
@@ -183,21 +171,14 @@ class Swept(SolidTool):
         return Distances(found.distance, normal, hessian + turn[:, None, None] * across[:, :, None] * across[:, None])
 
     def _distance(self, x):
-        """Return the signed distances of points from the unmoved tool, positive inside the tool, shape (n,), length.
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the signed distances from the unmoved tool, positive inside, shape (n,), length."""
         return self.profile.signed_distance(np.column_stack([self._profile_coordinate(x)[0], x[:, 2]]))
 
     def _profile_coordinate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return the coordinate r of points in the plane (r, z) of the profile, with its derivatives.
+        """Return the coordinate r of points, shape (n, 3), in the plane (r, z) of the profile, shape (n,), length.
 
-        Args:
-            x: positions, shape (n, 3), length.
-
-        Returns:
-            r, shape (n,), length; gradient of r with respect to x, shape (n, 3); curvature of the curve of constant r
-            in the plane of x and y through each point, shape (n,), 1/length.
+        Also its gradient, shape (n, 3), and the curvature of the curve of constant r through each point, shape (n,),
+        1/length.
         """
         way = np.zeros((len(x), 3))
         if self.kind == "extruded":
@@ -247,13 +228,9 @@ class Swept(SolidTool):
         write_stl(points + self.shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
 
     def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return vertices and triangles of the surface that a polyline sweeps.
+        """Return the vertices, shape (n, 3), length, and triangles, shape (m, 3), of a swept polyline.
 
-        Args:
-            outline: points (r, z) of the polyline, shape (k, 2), length.
-
-        Returns:
-            Vertices, shape (n, 3), length; vertex numbers of the triangles, shape (m, 3).
+        outline: points (r, z), shape (k, 2), length.
         """
         rings = np.array([np.insert(self._ring(r), 2, z, axis=1) for r, z in outline])
         m, n = rings.shape[:2]

@@ -18,21 +18,11 @@ _SMALLEST_TRIANGLE = 2e-3  # the same; at the tip of a cone the curvature would 
 
 
 def read_step(name: str, size: float | None, angle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return triangles on the surface of the solids in a STEP file, with exact normals.
+    """Return vertices, shape (n, 3), mm, triangles, shape (m, 3), and exact normals, shape (m, 3, 3), of a STEP file.
 
-    gmsh converts the lengths of the file to mm.
-
-    Args:
-        name: path of the file.
-        size: largest edge length of the triangles, mm; None: a quarter of the extent.
-        angle: largest angle that a curved surface turns within one triangle, degrees.
-
-    Returns:
-        Vertices, shape (n, 3), mm; vertex numbers of the triangles, shape (m, 3), counter-clockwise seen from outside;
-        unit normals at their corners, out of the solid, shape (m, 3, 3).
-
-    Raises:
-        InputError: gmsh cannot read the file, or it contains no solid.
+    Triangles are counter-clockwise from outside, normals at their corners point out of the solid. gmsh converts lengths
+    to mm. size: largest edge, mm; None: a quarter of the extent. angle: largest turn within a triangle, degrees. Raise
+    `InputError` if gmsh cannot read the file, or if it has no solid.
     """
     options = {"General.NumThreads": 1.0, "Mesh.MeshSizeFromCurvature": 360.0 / angle,
                "Mesh.MeshSizeExtendFromBoundary": 0.0}
@@ -59,13 +49,9 @@ def read_step(name: str, size: float | None, angle: float) -> tuple[np.ndarray, 
 
 
 def _body(gmsh: Any, entity: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return vertices, triangles and normals of a meshed solid, as `read_step`.
+    """Return vertices, triangles and normals of a meshed solid (dimension, tag), as `read_step`.
 
     gmsh is asked for normals at the parameters of its own nodes: it may find other parameters for a given point.
-
-    Args:
-        gmsh: the module, with the model.
-        entity: dimension and tag of the solid.
     """
     tags, X, _ = gmsh.model.mesh.getNodes()
     row = np.zeros(int(tags.max()) + 1, dtype=int)
@@ -96,9 +82,6 @@ def _turned(triangles: np.ndarray) -> np.ndarray:
     """Return the mask of the triangles to turn, so that all are oriented like their neighbours, shape (m,).
 
     Each triangle has two nodes in a graph, as it is and turned. Two neighbours are connected as they fit.
-
-    Args:
-        triangles: vertex numbers, shape (m, 3).
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

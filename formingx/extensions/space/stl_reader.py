@@ -16,12 +16,7 @@ from .bodies import merged
 def read_stl(name: str, caller: str = "solid") -> tuple[np.ndarray, np.ndarray]:
     """Return the vertices, shape (n, 3), and triangles, shape (m, 3), of an STL file, binary or text.
 
-    Args:
-        name: path of the file.
-        caller: name of the calling function, for messages.
-
-    Raises:
-        InputError: the file cannot be read, or is no STL file of a surface.
+    Raise `InputError` if the file cannot be read, or is no STL file of a surface.
     """
     try:
         with open(name, "rb") as stream:
@@ -46,14 +41,9 @@ def read_stl(name: str, caller: str = "solid") -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None:
-    """Raise an InputError unless the triangles of a surface are closed and oriented alike.
+    """Raise an `InputError` unless triangles, shape (m, 3), are closed and oriented alike.
 
     Each edge must belong to as many triangles in one direction as in the other.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        caller: name of the caller, for messages.
     """
     directed, edges, numbers, times = edges_of(triangles)
     sense = np.zeros(len(edges))

@@ -56,15 +56,7 @@ class Surface(Formulation):
     """For each pressure on a sliding sheet the virtual work of its removed tangential part, and of all of it (UFL)."""
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """Return the reference normal of a face of the surface, and the UFL measure of integrals over the surface.
-
-        Args:
-            name: name of the face (`SurfaceMesh.faces`).
-            quadrature_degree: not used; the degree is 1.
-
-        Returns:
-            Normal (UFL, shape (3,)), and the measure over the reference area.
-        """
+        """Return the normal of a face (UFL, shape (3,)) and the measure over the reference area, of degree 1."""
         return self.mesh.faces[name] * self._axes[2], self.dx(metadata={"quadrature_degree": 1})
 
     def refresh(self) -> None:
@@ -107,11 +99,7 @@ class Surface(Formulation):
         return Probe(problem, points)
 
     def admissible(self) -> Any:
-        """Return the check of the volume ratio (`Formulation.admissible`), which every state of a membrane passes.
-
-        Returns:
-            Object with the methods of `Admissible`.
-        """
+        """Return the check of the volume ratio, which every state of a membrane passes."""
         return _AlwaysAdmissible()
 
     def set_stiff(self) -> None:
@@ -119,15 +107,8 @@ class Surface(Formulation):
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
 
     def area_row(self, deformed: bool = False) -> Any:
-        """Return the linear form whose assembly gives the tributary areas of the nodes.
-
-        Args:
-            deformed: True for deformed areas, False for reference areas.
-
-        Returns:
-            Linear form (UFL) of the displacement; of the three entries of a node, the first is the tributary area,
-            length^2, and the others are 0.
-        """
+        """Return the linear form (UFL) of the tributary areas of nodes, length^2, reference or deformed.
+        The area is in the first of the three entries of a node, the others are 0."""
         ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
         return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
 
@@ -146,10 +127,9 @@ class Surface(Formulation):
         return sum(self.thicknesses.values())
 
     def _deformation_gradient(self) -> Any:
-        """Return the deformation gradient of the incompressible membrane, rotated to upper triangular form.
+        """Return F of the incompressible membrane, rotated to upper triangular form (UFL, shape (3, 3)).
 
-        Its rows belong to axes along the deformed first edge of each triangle, across it in the surface, and along the
-        normal (UFL, shape (3, 3)).
+        Its axes: along the deformed first edge, across it in the surface, and along the normal.
         """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         f1, f2 = (F * t for t in self._axes[:2])
@@ -199,17 +179,10 @@ class _AlwaysAdmissible:
 
 
 def relaxed(F: Any) -> Any:
-    """Return the deformation gradient whose energy is the relaxed energy of tension-field theory.
+    """Return the F whose energy is the relaxed energy of tension-field theory (UFL, shape (3, 3)).
 
-    Where the membrane is taut, the result is F. Where it wrinkles, the result is simple tension with the larger
-    principal stretch, in principal axes. Where both principal stretches are compressive, the result is the identity.
-
-    Args:
-        F: deformation gradient of an incompressible membrane, upper triangular, with the third axis along the normal
-            (UFL, shape (3, 3)).
-
-    Returns:
-        Deformation gradient (UFL, shape (3, 3)).
+    Where the membrane is taut, it is F. Where it wrinkles, it is simple tension with the larger principal stretch, in
+    principal axes. Where both stretches are compressive, it is the identity. F: upper triangular, third axis normal.
     """
     C11, C22, C12 = F[0, 0]**2, F[0, 1]**2 + F[1, 1]**2, F[0, 0] * F[0, 1]
     J = F[0, 0] * F[1, 1]
@@ -229,31 +202,17 @@ def relaxed(F: Any) -> Any:
 
 
 def smaller_stress(stretches: np.ndarray) -> np.ndarray:
-    r"""Return the smaller principal stress of a neo-Hookean membrane over its shear modulus.
+    r"""Return the smaller principal stress of a neo-Hookean membrane over its shear modulus, shape (n,).
 
     .. math:: \lambda_2^2 - (\lambda_1 \lambda_2)^{-2}
 
-    In compression it is negative for other materials, too.
-
-    Args:
-        stretches: principal stretches l1, l2 in the surface at n points, the larger first, shape (n, 2).
-
-    Returns:
-        Stress over shear modulus, shape (n,).
+    stretches: principal stretches in the surface, the larger first, shape (n, 2). In compression it is negative for
+    other materials, too.
     """
     return stretches[:, 1] ** 2 - stretches.prod(axis=1) ** -2
 
 
 def wrinkled(stretches: np.ndarray) -> np.ndarray:
-    """Return the mask of the points at which a membrane is in compression, and therefore wrinkles.
-
-    A sheet that sticks to a flat tool is compressed by the elastic slip of its points. Such negligible compression does
-    not count.
-
-    Args:
-        stretches: principal stretches l1, l2 in the surface at n points, the larger first, shape (n, 2).
-
-    Returns:
-        Mask, shape (n,), True where `smaller_stress` is below -1e-3.
-    """
+    """Return the mask of points where a membrane wrinkles, shape (n,): `smaller_stress` is below -1e-3.
+    So the compression by elastic slip on a flat tool does not count."""
     return smaller_stress(stretches) < -NEGLIGIBLE

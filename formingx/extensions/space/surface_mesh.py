@@ -146,14 +146,9 @@ class SurfaceMesh(Mesh):
 
 
 def volume_within(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Return the volume inside a surface that lids normal to z and planes of symmetry x = 0 and y = 0 close.
+    """Return the volume inside a surface, closed by lids normal to z and planes x = 0 and y = 0, length^3.
 
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3), counter-clockwise seen from outside.
-
-    Returns:
-        Volume, length^3.
+    triangles: shape (m, 3), counter-clockwise from outside.
     """
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
@@ -161,16 +156,10 @@ def volume_within(points: np.ndarray, triangles: np.ndarray) -> float:
 
 
 def below(points: np.ndarray, triangles: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the part of a surface below a plane normal to z.
+    """Return the part of a surface below the plane z = `level`, length.
 
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3).
-        level: coordinate z of the plane, length.
-
-    Returns:
-        Vertices of the part, shape (k, 3), length; vertex numbers of its triangles, shape (j, 3); for each of these the
-        number of the triangle of the surface, shape (j,).
+    Vertices, shape (k, 3), length; triangles, shape (j, 3); for each of these the number of its triangle of the
+    surface, shape (j,).
     """
     under = points[triangles][..., 2] <= level
     whole, cut = np.flatnonzero(under.all(1)), np.flatnonzero(under.any(1) & ~under.all(1))
@@ -187,21 +176,9 @@ def below(points: np.ndarray, triangles: np.ndarray, level: float) -> tuple[np.n
 
 def surface_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str, faces: tuple[str, str],
                  layers: Sequence[str] = ("sheet",), **more: Any) -> SurfaceMesh:
-    """Return the distributed mesh of a surface; collective.
+    """Return the distributed mesh of a surface, with its two faces among the boundaries; collective.
 
-    Args:
-        make: function that returns the grid of triangles, with one layer "sheet"; rank 0 calls it.
-        comm: MPI communicator.
-        what: name of the mesh, for error messages.
-        faces: names of the faces, first the one opposite to the normals of the triangles.
-        layers: names of the layers.
-        more: other attributes of the mesh.
-
-    Returns:
-        The mesh, with the two faces among its boundaries.
-
-    Raises:
-        InputError: `make` raised it, the elements are invalid, or two layers have the same name.
+    Rank 0 calls `make`; `faces[0]` is opposite to the normals. Raise `InputError` for invalid elements or names.
     """
     words = as_list(f"{what}: layers", layers, "names")
     if not words or len(set(words)) < len(words):
@@ -213,17 +190,7 @@ def of_plain(plain: Mesh, faces: tuple[str, str] = ("inner", "outer"), layers: S
              **more: Any) -> SurfaceMesh:
     """Return the mesh of a surface with the domain and the boundaries of a plain mesh of triangles.
 
-    Args:
-        plain: the mesh, whose triangles look to one side.
-        faces: names of the faces, first the one opposite to the normals of the triangles.
-        layers: names of the layers; default the one of the mesh.
-        more: other attributes of the mesh.
-
-    Returns:
-        The mesh, with the two faces among its boundaries.
-
-    Raises:
-        InputError: the mesh has several layers, or six-node triangles.
+    `faces[0]` is opposite to the normals. Raise `InputError` for several layers, or for six-node triangles.
     """
     if len(plain.layers) > 1 or cell_node_positions(plain.domain, own_cells(plain.domain)[:0]).shape[1] > 3:
         raise InputError(f"a surface in three dimensions consists of three-node triangles, and each layer covers all of"

@@ -23,15 +23,9 @@ def files_of(tool: Any) -> list[Triangulated]:
 
 @register("start")
 def unresolved_files(body: Any) -> Iterator[Finding]:
-    """Find STL files whose triangles do not resolve the surface: sharp edges across triangles, or noise.
+    """Yield a finding for each STL file that does not resolve its surface: sharp edges across triangles, or noise.
 
     The fitted normals then satisfy the equations of smooth edges badly (`Triangulated.roughness`).
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each such file.
     """
     for contact in body.scene.contacts:
         for tool in files_of(contact.tool):
@@ -47,14 +41,7 @@ def unresolved_files(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def coarse_fillets_of_files(body: Any) -> Iterator[Finding]:
-    """Find concave fillets of tools that are smaller than the triangles of the sheet; collective.
-
-    Args:
-        body: the examined body, whose `scene` has the contacts.
-
-    Yields:
-        A finding for each tool with such a fillet.
-    """
+    """Yield a finding for each tool with a concave fillet smaller than the triangles of the sheet; collective."""
     scene = body.scene
     if scene.kinematics.components != 3 or not scene.mesh.flat:
         return
@@ -84,15 +71,9 @@ def coarse_fillets_of_files(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def rough_thickness(body: Any) -> Iterator[Finding]:
-    """Find thickness functions that the triangles of the sheet do not resolve; collective.
+    """Yield a finding for each layer whose thickness the triangles of the sheet do not resolve; collective.
 
     The membrane uses linear thickness in each triangle, the wall the value in its middle. Both must agree.
-
-    Args:
-        body: the examined body, with its `scene`.
-
-    Yields:
-        A finding for each layer with such a thickness.
     """
     scene = body.scene
     if scene.kinematics.components != 3:

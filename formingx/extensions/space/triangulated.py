@@ -59,10 +59,7 @@ class Triangulated(SolidTool):
         self.middle = points.mean(0)
 
     def _distance(self, x):
-        """Return the signed distances of points from the unmoved tool, positive inside the tool, shape (n,), length.
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the signed distances from the unmoved tool, positive inside, shape (n,), length."""
         return np.max([surface.distance(x) for surface in self.surfaces], axis=0, initial=-np.inf)
 
     def _distances(self, x):

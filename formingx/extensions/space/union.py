@@ -36,10 +36,7 @@ class Union(SolidTool):
         return np.asarray(np.argmax([part.signed_distance(x - self.shift) for part in self.parts], axis=0))
 
     def _distance(self, x):
-        """Return the signed distances of points from the unmoved tool, positive inside the tool, shape (n,), length.
-
-        x: positions, shape (n, 3), length.
-        """
+        """Return the signed distances from the unmoved tool, positive inside, shape (n,), length."""
         return np.max([part.signed_distance(x) for part in self.parts], axis=0)
 
     def _distances(self, x):

@@ -366,16 +366,9 @@ class SheetWall(ColumnTable):
 
 
 def wall_of(path: Any, state: Any) -> SheetWall:
-    """Return the wall thickness of a sheet in a state; collective.
+    """Return the wall thickness of a sheet in a state, with the positions of the nodes; collective.
 
     The order of nodes and triangles does not depend on the number of ranks.
-
-    Args:
-        path: the computed `Path`.
-        state: a `State` of the path.
-
-    Returns:
-        Wall thickness of each triangle, with the positions of the nodes.
     """
     problem = path.problem
     forms, domain, comm = problem.forms, problem.forms.domain, problem.comm
