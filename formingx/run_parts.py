@@ -29,25 +29,11 @@ log = logging.getLogger("formingx")
 
 def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
                         run: Callable[[Scene, Any, bool], Path]) -> Path:
-    """Return the path of a run on a mesh that is adapted to a first run.
+    """Return the path of a run on a mesh that is adapted to a first run, `Path.pilot`, kept in the folder "pilot".
 
-    With a checkpoint, the states of the first run are stored in its folder "pilot".
-
-    Args:
-        caller: name of the calling function, `trace` or `Process`, for messages.
-        adapt_mesh: argument of the calling function: True, or {argument of `mesh.adapted`: value}.
-        start: argument of the calling function; must be None.
-        resume: argument of the calling function, True or False.
-        scene: the scene on the first mesh.
-        checkpoint: folder of the checkpoint of the second run, or None.
-        run: function of a scene, a checkpoint and `resume` that returns the path of a run.
-
-    Returns:
-        Path of the second run; `Path.pilot` is the path of the first.
-
-    Raises:
-        InputError: an argument is not allowed.
-        ConvergenceError: the second run failed, or the first run failed with fewer than three states.
+    adapt_mesh, start, resume, checkpoint: arguments of `caller`. `run` maps a scene, a checkpoint and `resume` to a
+    path. Raise `InputError` for an argument that is not allowed. Raise `ConvergenceError` if the second run failed, or
+    the first with fewer than three states.
     """
     if start is not None:
         raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins with the unloaded body and makes"
@@ -80,12 +66,7 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
 
 
 def _stored_pilot(folder: Any, scene: Scene) -> Path | None:
-    """Return the path of a pilot run that has ended from its checkpoint; None without one; collective.
-
-    Args:
-        folder: folder of the checkpoint, or None.
-        scene: the scene on the first mesh.
-    """
+    """Return the path of a pilot run that has ended, from the checkpoint `folder`; None without one; collective."""
     comm = scene.mesh.comm
     if folder is None or not holds_states(folder, comm) or not files.on_root(comm, lambda: ended(folder) is not None):
         return None
@@ -94,16 +75,7 @@ def _stored_pilot(folder: Any, scene: Scene) -> Path | None:
 
 
 def check_start(state: State, stages: list[Stage], problem: Problem) -> None:
-    """Check that a process of given stages can continue from a state.
-
-    Args:
-        state: the state.
-        stages: all stages of the process.
-        problem: the discretised problem of the scene.
-
-    Raises:
-        InputError: the state belongs to another scene, or to none of the stages.
-    """
+    """Raise `InputError` if a state belongs to another scene, or to none of the stages of a process."""
     number = state.setting.get("stage", -1)
     if len(state.x) != problem.x.getLocalSize() or not 0 <= number < len(stages):
         raise InputError("Process: start: must be a path of this process: its last state belongs to another scene or"
@@ -116,18 +88,10 @@ def check_start(state: State, stages: list[Stage], problem: Problem) -> None:
 
 def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, allow_inadmissible: bool,
              found: list[Finding], timed: bool = False) -> Path:
-    """Return a new path that begins with the states of another path, or with a state.
+    """Return a new path that begins with the states of `start`, a path or a state; None: without states.
 
-    Args:
-        curve: solver of the states of the new path.
-        start: the other path, or the state; None to begin without states.
-        columns: {name: quantity} of additional columns, the argument `record` of `trace`.
-        allow_inadmissible: argument of `trace`.
-        found: findings of the checks before the run, which this function logs.
-        timed: True if the process time is a column.
-
-    Returns:
-        The path.
+    columns: the argument `record` of `trace`. found: findings of the checks before the run, which are logged. timed:
+    True if the process time is a column.
     """
     record = Record(curve.problem, curve)
     record.findings = found
@@ -141,13 +105,7 @@ def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Mea
 
 
 def write_checkpoints(path: Path, checkpoint: Any, plans: Sequence[Plan] = ()) -> None:
-    """Register functions that write a checkpoint after each step and at the end of a run.
-
-    Args:
-        path: path of the run.
-        checkpoint: folder of the checkpoint, or None for no checkpoint.
-        plans: plans of the stages of a process.
-    """
+    """Register functions that write a checkpoint after each step and at the end of a run; None: no checkpoint."""
     if checkpoint is not None:
         writer = Checkpoint(checkpoint, path)
         if plans:
@@ -160,17 +118,8 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
                plans: Sequence[Plan] = ()) -> Any:
     """Return the path that a run continues: `start`, or with `resume` the path in the checkpoint, or None.
 
-    Args:
-        caller: name of the calling function, `trace` or `Process`, for messages.
-        resume: argument of the calling function, True or False.
-        checkpoint: argument of the calling function, a folder or None.
-        scene: the scene.
-        start: argument of the calling function, a path or None.
-        plans: plans of the stages of a process.
-
-    Raises:
-        InputError: `resume` is given together with `start`, or without a checkpoint, or the checkpoint is of other
-            stages.
+    caller: name of the calling function, for messages. Raise `InputError` if `resume` is given with `start`, or without
+    a checkpoint, or for other stages.
     """
     if not resume:
         return start
@@ -187,21 +136,10 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
 
 @contextlib.contextmanager
 def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
-    """Attach the computed path to the errors of a run within a block.
+    """Attach the path, which the yielded function registers and returns, to the errors of a run in a block.
 
-    At the end of the block the functions `path.record.hooks.on_end` are called.
-
-    Args:
-        checkpoint: folder of the checkpoint, for messages; or None.
-
-    Yields:
-        Function that registers and returns the path of the run.
-
-    Raises:
-        ConvergenceError: the run failed; without the traceback of the solver.
-        InputError: a stage was refused during the run.
-        Interrupted: Ctrl-C was pressed.
-        Exception: a function of the script failed, such as a material or a column; it has the `path`, too.
+    At the end of the block `path.record.hooks.on_end` are called. `ConvergenceError` (without the traceback of the
+    solver), `InputError`, `Interrupted` and errors of a script's functions, such as a material or a column, pass on.
     """
     paths: list[Path] = []
 
@@ -246,12 +184,6 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
 
 
 def _call_listeners(path: Path, failure: str, found: list[Finding]) -> None:
-    """Call the functions that are registered for the end of a run, `path.record.hooks.on_end`.
-
-    Args:
-        path: path of the run.
-        failure: error message of a failed run, or "".
-        found: findings of the checks after the run.
-    """
+    """Call `path.record.hooks.on_end` with the error message of a failed run, or "", and the findings."""
     for listener in path.record.hooks.on_end:
         listener(failure, found)
