@@ -76,8 +76,8 @@ class Probe:
         .. math::
             \lambda = (1 + \text{row} \cdot x)^{\text{power}}
 
-        The two points lie on the axis, the lower one first. Incompressibility gives the in-plane stretch from that of the
-        thickness: the power is -1/2 if axisymmetric, -1 in plane strain.
+        The two points lie on the axis, the lower one first. Incompressibility gives the in-plane stretch from that of
+        the thickness: the power is -1/2 if axisymmetric, -1 in plane strain.
         """
         (_, low), (_, high) = self.points
         row = self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low)
