@@ -105,16 +105,5 @@ def _overlaps(scene: Scene, targets: Sequence[Target], stages: Sequence[Stage]) 
 
 
 def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[Stage] = ()) -> list[Finding]:
-    """Return the findings of the checks that precede every run: on magnitudes, and on motions of tools; collective.
-
-    They are a part of the findings of `check`.
-
-    Args:
-        scene: the scene.
-        targets: targets of the run.
-        stages: stages of the process.
-
-    Returns:
-        The findings, the worst first; empty for a sound scene.
-    """
+    """Return the findings, worst first, of the checks that precede every run (magnitudes, tools); collective."""
     return findings_at("start", SizedBody(scene, targets, stages, NONE))

@@ -19,10 +19,7 @@ def inadmissible(path: Any) -> Iterator[Finding]:
 
 @register("end")
 def volumes(path: Any) -> Iterator[Finding]:
-    """Report elements of a `Path` whose volume ratio J is not 1 in the last state; collective.
-
-    The root mean square of J - 1 is above 0.005, or J at a point is not between 1/2 and 2.
-    """
+    """Yield findings on volume ratios J with RMS above 0.005 or outside 1/2 to 2 in the last state; collective."""
     error = path.last.measures["volume_error"]
     yield from volume.findings(error, "the last state", volume.away_from_clamps(path) if error > NOTICEABLE else None)
     yield from volume.extreme_ratio(path)

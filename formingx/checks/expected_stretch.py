@@ -7,16 +7,9 @@ import numpy as np
 
 
 def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
-    """Yield estimates of the stretches that a flat axisymmetric sheet will reach.
+    """Yield (target or mould as text, stretch) that a flat axisymmetric sheet is expected to reach.
 
-    For each target of the run, it is the pole stretch of the sheet as a free spherical cap. In a closed mould, it is
-    the square root of the areal draw ratio.
-
-    Args:
-        body: the `SizedBody` to be checked.
-
-    Yields:
-        Pairs (target or mould as text, stretch).
+    A target gives the pole stretch of a free spherical cap, a closed mould the square root of the areal draw ratio.
     """
     for face in body.pressurised_faces:
         if not face.flat or not face.axisymmetric:
@@ -38,12 +31,7 @@ def _cap_stretch(target: Any, radius: float) -> float | None:
     .. math::
         \lambda = 1 + (H / a)^2
 
-    Args:
-        target: a `Target` that is a pole stretch, a pole height or an enclosed volume.
-        radius: radius a of the disc, length.
-
-    Returns:
-        The stretch, or None for another target.
+    The target is a pole stretch, a pole height or an enclosed volume; for any other None is returned.
     """
     if target.name == "pole_stretch":
         return float(target.value)
@@ -58,8 +46,5 @@ def _cap_stretch(target: Any, radius: float) -> float | None:
 
 
 def _area(line: np.ndarray) -> float:
-    """Return the area of the surface of revolution of a polyline over pi, length^2.
-
-    line: points (r, z) of the polyline, shape (n, 2), length.
-    """
+    """Return the area of the surface of revolution of a polyline, shape (n, 2), over pi, length^2."""
     return float(np.sum((line[1:, 0] + line[:-1, 0]) * np.hypot(*np.diff(line, axis=0).T)))

@@ -14,39 +14,21 @@ _OPPOSITE = {"top": "bottom", "bottom": "top", "inner": "outer", "outer": "inner
 
 
 def moulds(scene: Scene) -> list[Contact]:
-    """Return the contacts of a scene with moulds.
-
-    A mould is a fixed tool that lies in front of at least half of the undeformed face of its contact.
-    """
+    """Return the contacts with moulds, fixed tools in front of at least half of the undeformed face."""
     return [contact for contact in scene.contacts if contact.direction is None and _covers_face(scene, contact)]
 
 
 def sign_towards(contact: Contact, load: Any) -> float:
-    """Return the direction in which a positive pressure pushes a sheet: towards a tool or away from it.
-
-    Args:
-        contact: the `Contact` of one face of the sheet with the tool.
-        load: the `Pressure` on the same face or on the opposite one.
-
-    Returns:
-        1 towards the tool, -1 away from it, 0 if the contact or the pressure is not on a face of a sheet.
-    """
+    """Return 1 if a positive pressure pushes a sheet towards a tool, -1 away from it, 0 off its faces."""
     if contact.on not in _OPPOSITE or load.on not in _OPPOSITE:
         return 0.0
     return {contact.on: -1.0, _OPPOSITE[contact.on]: 1.0}.get(load.on, 0.0)
 
 
 def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, limit: float) -> np.ndarray:
-    """Return the distances from points to a tool, measured along a given direction at each point.
+    """Return the distances along unit directions, (n, c), from outside points to a tool, shape (n,), length.
 
-    Args:
-        tool: the tool.
-        points: positions outside the tool, shape (n, c), length.
-        directions: unit vectors along which the distances are measured, shape (n, c).
-        limit: largest distance that is examined, length.
-
-    Returns:
-        The distances, shape (n,), length; infinity if the tool is not met within `limit`.
+    A tool that is not met within `limit`, length, has infinity.
     """
     distance = np.zeros(len(points))
     rows: np.ndarray = np.arange(len(points))
@@ -61,18 +43,7 @@ def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, l
 
 
 def outward_directions(points: np.ndarray, opposite: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return nodes of a face of a sheet, and unit vectors there that point away from the opposite face.
-
-    The unit vector at a node points to it from the nearest node of the opposite face.
-
-    Args:
-        points: nodes (R, Z) of the face, shape (n, 2), length.
-        opposite: nodes (R, Z) of the opposite face, shape (m, 2), length.
-
-    Returns:
-        The k nodes of the face that do not lie on the opposite face, shape (k, 2), length; the unit vectors, shape
-        (k, 2).
-    """
+    """Return the k nodes of a face off the opposite one, (k, 2), and their unit vectors away from it, (k, 2)."""
     directions = points - opposite[np.argmin(np.hypot(*(points[:, None] - opposite).transpose(2, 0, 1)), axis=1)]
     size = np.hypot(*directions.T)
     return points[size > 0], directions[size > 0] / size[size > 0, None]

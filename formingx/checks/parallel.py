@@ -13,10 +13,7 @@ WITHOUT_GAIN = 1_150_000
 def unknowns(scene: Scene) -> int:
     """Return the approximate number of unknowns of a scene, without compiling its forms; collective.
 
-    Lagrange multipliers are not counted. A continuous pressure counts once at an interface between layers.
-
-    Args:
-        scene: the scene. For an axisymmetric membrane, displacements at all nodes of its mesh of triangles are counted.
+    Lagrange multipliers are not counted; a continuous pressure counts once at an interface between layers.
     """
     topology = scene.mesh.domain.topology
     topology.create_entities(1)

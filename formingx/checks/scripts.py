@@ -21,9 +21,6 @@ class _DryRun(BaseException):
     """Exception raised in place of the first run of a script.
 
     It is not an `Exception`, so that a script does not catch it.
-
-    Args:
-        report: findings on the scene of the run.
     """
 
     def __init__(self, report: Report):
@@ -32,17 +29,10 @@ class _DryRun(BaseException):
 
 
 def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
-    """Check the first scene that a script runs; nothing is solved.
+    """Return the findings on the first scene that a Python script runs; nothing is solved.
 
-    Args:
-        script: name of a Python file. The code before its first run is executed, calls of `formingx.heat` included.
-        arguments: command line arguments of the script.
-
-    Returns:
-        The findings on the scene and the targets of this run.
-
-    Raises:
-        InputError: there is no such file, it is not Python, it runs no scene, or `check` refuses the scene or a target.
+    The code before its first run is executed, calls of `formingx.heat` included. A missing file, a script without a
+    run, or a refused scene is an InputError.
     """
     file = file_path("check: script", script)
     if not file.is_file():
@@ -61,11 +51,7 @@ def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
 
 
 def _check_python(file: Path) -> None:
-    """Check that a file is Python source.
-
-    Raises:
-        InputError: it is not.
-    """
+    """Raise an InputError unless a file is Python source."""
     try:
         compile(file.read_bytes(), os.fspath(file), "exec")
     except (SyntaxError, ValueError, OverflowError, MemoryError, RecursionError) as error:

@@ -54,12 +54,6 @@ class PrescribedValue(NamedTuple):
 class SizedBody(Triangles):
     """Body before its run, with the targets of the run: the argument of the checks before a run ("scene", "start").
 
-    Args:
-        scene: the scene.
-        targets: targets of the run.
-        stages: stages of the process.
-        units: units of the script, for the numbers in the findings.
-
     Attributes:
         scene: the scene.
         moduli: {layer: shear modulus}, stress.
@@ -94,21 +88,13 @@ class SizedBody(Triangles):
                     PrescribedValue(item, str(item.quantity), value, f"the table of {name!r} in {stage.label}"))
 
     def format(self, value: float, kind: str, digits: int = 4) -> str:
-        """Return a number with its unit as text, such as "0.25 MPa".
-
-        Args:
-            value: the number.
-            kind: quantity that determines the unit: "pressure", "travel" (a length), "force" or "stress".
-            digits: number of significant digits.
-        """
+        """Return a number with its unit, such as "0.25 MPa", for a "pressure", "travel", "force" or "stress"."""
         return f"{value:.{digits}g} {self._units.unit_of(kind)}".rstrip()
 
     def _prescribed_values(self, target: Target, control: Any) -> list[PrescribedValue]:
         """Return a list with the prescribed value of a target that is a pressure or a travel; else an empty list.
 
-        Args:
-            target: the target.
-            control: the load, support or tool that the run controls, to which a target without a name belongs.
+        A target without a name belongs to the `control` of the run.
         """
         name, _, quantity = str(target.name).rpartition("_")
         if quantity not in ("pressure", "travel"):
@@ -139,12 +125,6 @@ class SizedBody(Triangles):
 
 class PressurisedFace:
     """Face of a sheet on which a pressure acts, with the fixed tools on the other side of the sheet.
-
-    Args:
-        body: the `SizedBody` with the face.
-        load: the `Pressure` on the face.
-        line: nodes (R, Z) of the face in order, shape (n, 2), length.
-        tools: contacts of the opposite face with fixed tools.
 
     Attributes:
         load: the `Pressure` on the face.
@@ -183,9 +163,7 @@ class PressurisedFace:
     def peak(self) -> Peak | None:
         """Return the first pressure maximum in the inflation of the flat sheet or tube without tools.
 
-        Returns:
-            Pressure and stretch at the maximum: pole stretch of a sheet, hoop stretch of a tube. None without a
-            maximum, and for other shapes, plane strain, or materials that vary over the body.
+        It has the pole or hoop stretch; None without a maximum, in plane strain or for variable materials.
         """
         materials = self._body.scene.materials
         if not self.axisymmetric or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
@@ -194,13 +172,9 @@ class PressurisedFace:
         return first_peak(blown.tube if self.tall else blown.disc)
 
     def remaining_pressure(self, blow_ratio: float) -> tuple[float, Peak] | None:
-        """Return the lowest pressure of a free tube from its pressure maximum to the hoop stretch in the mould.
+        """Return the lowest pressure of a free tube from its maximum to the blow ratio, over it, and this maximum.
 
-        Args:
-            blow_ratio: this hoop stretch: radius of the mould over radius of the parison.
-
-        Returns:
-            Lowest pressure over pressure maximum, and the maximum. None without a maximum below the blow ratio.
+        The blow ratio is the radius of mould over parison. None without a maximum below it.
         """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
@@ -316,14 +290,7 @@ def _open_moulds(body: SizedBody) -> Found:
 
 
 def _pressure_direction(face: PressurisedFace, points: np.ndarray) -> np.ndarray:
-    """Return the direction in which a pressure pushes the sheet, as a unit vector (r, z).
-
-    It is radially outward for a tube and axial for other bodies.
-
-    Args:
-        face: the face under pressure.
-        points: points (r, z) of the opposite face, shape (n, 2), length.
-    """
+    """Return the unit vector (r, z) of a pressure on opposite points (n, 2): radial for a tube, else axial."""
     offset = points.mean(0) - face.line.mean(0)
     return np.array([0.0, np.sign(offset[1])]) if not face.tall else np.array([1.0, 0.0])
 
@@ -391,14 +358,8 @@ def _gaps(faces: list[tuple[Tool, np.ndarray]], direction: Any, start: float, tr
           tolerance: float) -> np.ndarray:
     """Return the smallest gap between tools and undeformed faces at n increasing travels, shape (n,), length.
 
-    The last travel is the first touch, or `travel_range`. The travel grows by half the gap, at least the tolerance.
-
-    Args:
-        faces: pairs (tool, nodes of the face that it touches, shape (n, c), length).
-        direction: displacement of all tools per travel, shape (c,).
-        start: smallest gap at the travel 0, length.
-        travel_range: largest travel, length.
-        tolerance: gap up to which a tool touches a face, length.
+    The travel grows by half the gap, at least `tolerance`, to the first touch or `travel_range`. Faces are (tool, nodes
+    (n, c)).
     """
     travel, gaps, speed = 0.0, [start], float(np.linalg.norm(direction))
     while travel < travel_range and (len(gaps) == 1 or gaps[-1] > min(tolerance, start)):
@@ -408,15 +369,7 @@ def _gaps(faces: list[tuple[Tool, np.ndarray]], direction: Any, start: float, tr
 
 
 def _gap(faces: list[tuple[Tool, np.ndarray]], direction: Any, travel: float) -> float:
-    """Return the smallest distance between tools and undeformed faces after a travel of the tools, length.
-
-    It is negative if a tool lies inside the body.
-
-    Args:
-        faces: pairs (tool, nodes of the face that it touches, shape (n, c), length).
-        direction: displacement of all tools per travel, shape (c,).
-        travel: the travel, length.
-    """
+    """Return the least gap of (tool, nodes (n, c)) after a travel, length; negative with a tool in the body."""
     return min(float(-tool.signed_distance(nodes - travel * np.array(direction)).max()) for tool, nodes in faces)
 
 

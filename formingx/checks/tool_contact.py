@@ -17,12 +17,9 @@ from .mould_side import moulds
 
 @register("end")
 def untouched(path: Any) -> Iterator[Finding]:
-    """Report tools that the body never touched while they were active, and moulds from which the body moved away.
+    """Yield warnings on active tools never touched, and moulds from which the body moved away; collective.
 
-    Collective.
-
-    Args:
-        path: the `Path` of the run. There are no findings on a remeshed run.
+    A remeshed run has no findings.
     """
     segment = path.segments[-1]
     problem, states = segment.problem, segment.states
@@ -59,15 +56,9 @@ def untouched(path: Any) -> Iterator[Finding]:
 
 
 def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
-    """Return the states in which the contact of a tool with the body is to be examined, the most promising first.
+    """Return the states in which to examine the contact of a tool, the most promising first.
 
-    States with a force on the tool come first, the last one of them at the front. States in which any tool touches the
-    body follow, because the side walls of a mould bear no force along Z.
-
-    Args:
-        path: the `Path` of the run.
-        states: states in which the tool is active.
-        name: name of the tool (`Tooling.names`).
+    The last state with a force comes first; states with touch follow.
     """
     column = Tooling.of_problem(path.problem).force_columns.get(name, "")
     forced = [state for state in states if state.measures.get(column)]
