@@ -12,14 +12,9 @@ _CHUNK = 2**18      # pairs that are compared at a time
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield arrays of the pairs of boxes that overlap or touch.
+    """Yield indices i and j, (k,) each, of boxes that overlap or touch, every pair once.
 
-    Args:
-        low: lower corners of the boxes, shape (n, 2), finite.
-        high: upper corners of the boxes, shape (n, 2), finite.
-
-    Yields:
-        Indices i and j of overlapping boxes, shape (k,) each. Every pair occurs once, in either order.
+    The lower and upper corners are finite, shape (n, 2).
     """
     if len(low)**2 <= MAX_COMPARED:
         pairs, count = np.empty((0, 2), dtype=int), 8 * len(low)

@@ -106,11 +106,7 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
     """Return the number of elements along the radius of a disc for an accuracy, and the numbers through its layers.
 
-    Args:
-        accuracy: "draft", "standard" or "fine".
-        low: inner radius, length.
-        high: outer radius, length.
-        layers: {name: function of radii, shape (n,), that returns the thickness of the layer, shape (n,), length}.
+    Layers are {name: function of radii (n,), that returns the thickness (n,), length}, from radius `low` to `high`.
     """
     along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
@@ -125,32 +121,16 @@ def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -
 
 def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coordinates: np.ndarray,
                  through: list[np.ndarray], body: Callable[[np.ndarray, list[np.ndarray]], Mesh]) -> Mesh:
-    """Return the mesh with a `Preset`, which stores the accuracy and how to mesh the same body with other elements.
-
-    Args:
-        mesh: the mesh.
-        accuracy: "draft", "standard" or "fine".
-        layers: {name: thickness, length, as a function of coordinates along the sheet, such as the radius of a disc}.
-        coordinates: coordinates at which the largest thickness is sought, shape (n,).
-        through: ends of the k elements through each layer, from 0 to 1, shape (k + 1,).
-        body: function that returns a mesh. Its arguments are the coordinates of the ends of the columns, shape
-            (columns + 1,), and the ends of the elements through each layer in the form of `through`.
-    """
+    """Return the mesh with a `Preset`, from which `body` makes the same body with other column and layer ends."""
     thickness = np.array([thickness_at(coordinates).max() for thickness_at in layers.values()])
     return replace(mesh, preset=Preset(accuracy, thickness, tuple(len(ends) - 1 for ends in through), lambda ends, n:
                                        body(ends, [np.linspace(0.0, 1.0, m + 1) for m in n])))
 
 
 def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
-    """Return the argument `concentrate` of `disc`, checked and sorted by radius.
+    """Return the argument {radius: relative size} `concentrate` of `disc`, checked and sorted by radius.
 
-    Args:
-        concentrate: {reference radius: element size there over the largest}.
-        low: inner radius of the disc, length.
-        high: outer radius, length.
-
-    Raises:
-        InputError: a radius is not on the disc, or a relative size is not between 1e-6 and 1.
+    A radius that is not on the disc, or a size not between 1e-6 and 1, is an InputError.
     """
     if not isinstance(concentrate, Mapping) or not concentrate:
         raise InputError(f"disc: concentrate = {concentrate!r}: must be {{reference radius: relative size}}")
@@ -173,14 +153,7 @@ def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]
 
     .. math:: s(R) = \min_i \left[s_i + (1 - s_i) \frac{|R - R_i|}{D}\right]
 
-    Args:
-        low: smallest radius, length.
-        high: largest radius, length.
-        along: number of elements.
-        sizes: {R_i: s_i}; each R_i is the end of an element.
-
-    Raises:
-        InputError: there are fewer elements than intervals between these radii.
+    Each R_i is the end of an element; fewer elements than intervals between the R_i are an InputError.
     """
     radii, small = np.array(list(sizes)), np.array(list(sizes.values()))
     ends = np.unique([low, *radii, high])
@@ -288,9 +261,7 @@ def parison(*, inner_radius: float, thickness: Thickness | Mapping[str, Thicknes
     node = joints[1 + np.argmin(np.abs(joints[1:-1] - joint))]
 
     def height_and_angle(from_neck: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the height above the half sphere, length, and the angle below the equator, radians, shape (n,) each.
-
-        from_neck: coordinates along the wall, 0 at the neck, 1 on the axis, shape (n,).
+        """Return height (length) and angle below the equator (radians) at coordinates (n,), 0 (neck) to 1 (axis).
         """
         return (length * np.maximum(1 - from_neck / node, 0.0),
                 np.pi / 2 * np.maximum((from_neck - node) / (1 - node), 0.0))
@@ -369,15 +340,7 @@ def from_lines(inner: Any, outer: Any, *, elements: tuple = (1, 2), layers: Mapp
 
 
 def _checked_points(name: str, points: Any) -> np.ndarray:
-    """Return an argument with points (R, Z) as an array, shape (n, 2), length.
-
-    Args:
-        name: name of the argument, for error messages.
-        points: the points, a sequence of pairs.
-
-    Raises:
-        InputError: there are fewer than two points, or a coordinate is not finite.
-    """
+    """Return at least two finite points (R, Z) as an array, (n, 2), length; otherwise an InputError by name."""
     found = np.array(as_points(name, points))
     if len(found) < 2 or not np.all(np.isfinite(found)):
         raise InputError(f"{name} = {points!r}: must be at least two points (R, Z) of finite numbers")
@@ -386,21 +349,10 @@ def _checked_points(name: str, points: Any) -> np.ndarray:
 
 def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray, fixed: Any, layers: list[str],
           through: list[np.ndarray], sides: tuple, comm: MPI.Comm) -> Mesh:
-    """Return the mesh of quadratic triangles on rows and columns of nodes.
+    """Return the mesh of quadratic triangles on rows and columns of nodes, with diagonals as on a chessboard.
 
-    Each rectangle of four corners is divided into two triangles. In each layer the diagonals alternate as on a
-    chessboard.
-
-    Args:
-        kind: name of the body, for messages.
-        place: function of k coordinates along the body, shape (k,), that returns the nodes (R, Z) of all rows there,
-            shape (rows, k, 2), length.
-        ends: coordinates of the ends of the columns of elements, shape (n + 1,).
-        fixed: coordinates of the ends that another mesh of this body must keep (`Columns.fixed`), shape (m,).
-        layers: names of the layers, the first row of nodes first.
-        through: ends of the elements through each layer on [0, 1].
-        sides: names of the four boundaries: first column, last column, first row, last row.
-        comm: MPI communicator.
+    `place` maps coordinates (k,) to nodes of all rows, (rows, k, 2), length; `ends` of columns (n + 1,) and `fixed`
+    ones (m,) are coordinates. `sides` name first column, last column, first row, last row.
     """
     points = place(with_middles(ends))
     number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])

@@ -13,16 +13,10 @@ from .edges import edges_of
 
 
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """Check the triangles of a mesh in the reference configuration.
+    """Raise an InputError, with the position, for invalid triangles in the reference configuration.
 
-    Args:
-        points: nodes (R, Z), shape (n, 2), length.
-        triangles: node numbers, shape (m, 3 or 6): corners, then middles of edges 01, 12, 20.
-        what: name of the mesh, with which the message begins.
-
-    Raises:
-        InputError: a coordinate is not finite. An element is flat or inverted. Two elements overlap, or meet without
-            sharing their nodes. The body is in pieces. The message gives the position.
+    Nodes have shape (n, 2), length, triangles (m, 3 or 6). Elements must be finite, not inverted, not overlapping, and
+    in one piece.
     """
     bad = np.flatnonzero(~np.isfinite(points).all(1))
     if len(bad):
@@ -71,15 +65,9 @@ def connected_pieces(triangles: np.ndarray) -> np.ndarray:
 
 
 def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """Check that each edge has one mid-edge node, which is no corner and belongs to no other edge.
+    """Raise an InputError unless each edge has one mid-edge node, no corner and of no other edge.
 
-    Args:
-        points: nodes (R, Z), shape (n, 2), length.
-        triangles: node numbers, shape (m, 3 or 6); triangles of three nodes pass.
-        what: name of the mesh, for messages.
-
-    Raises:
-        InputError: an edge violates this.
+    Nodes have shape (n, 2), length, triangles (m, 3 or 6); three nodes pass.
     """
     if triangles.shape[1] != 6:
         return
@@ -98,13 +86,9 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def inverted(nodes: np.ndarray) -> np.ndarray:
-    """Return True for triangles whose Jacobian determinant vanishes at a node, or changes sign between nodes.
+    """Return a mask (m,) of triangles (m, 3 or 6, 2) whose Jacobian vanishes at a node or changes sign.
 
-    Args:
-        nodes: nodes (R, Z) of each triangle, corners first, shape (m, 3 or 6, 2), length.
-
-    Returns:
-        Booleans, shape (m,); False for triangles of three nodes.
+    Triangles of three nodes have False.
     """
     if nodes.shape[1] != 6:
         return np.zeros(len(nodes), dtype=bool)
@@ -122,14 +106,8 @@ def inverted(nodes: np.ndarray) -> np.ndarray:
 def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: str) -> np.ndarray:
     """Return the edges of the outline, which belong to one element only, as node numbers, shape (k, 2).
 
-    Args:
-        points: nodes (R, Z), shape (n, 2), length.
-        triangles: node numbers of the corners, shape (m, 3).
-        turn: 1 for counter-clockwise triangles, -1 for clockwise ones, shape (m,).
-        what: name of the mesh, for messages.
-
-    Raises:
-        InputError: two elements lie on the same side of an edge.
+    `turn` is 1 for counter-clockwise triangles, (m, 3), else -1. Two elements on the same side of an edge are an
+    InputError.
     """
     directed, edges, numbers, times = edges_of(triangles)
     side = np.where(directed[:, 0] < directed[:, 1], 1, -1) * np.tile(turn, 3)           # side of the element
@@ -143,28 +121,15 @@ def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: 
 
 
 def crossing_point(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
-    """Find an edge that crosses another edge, or touches it anywhere but in a common node.
-
-    Args:
-        points: ends of the edges, shape (n, 2), length.
-        edges: for each edge the rows of its two ends in `points`, shape (k, 2).
-
-    Returns:
-        Middle of such an edge, shape (2,), length; None if no edges cross.
-    """
+    """Return the middle, (2,), of an edge (k, 2) that crosses another or touches it off a common node; or None."""
     pairs = next(crossing_edges(points, edges), None)
     return None if pairs is None else points[edges[pairs[0, 0]]].mean(0)
 
 
 def crossing_edges(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the pairs of edges that cross, or touch anywhere but in a common node.
+    """Yield the indices of edges that cross, or touch anywhere but in a common node, (m, 2), m > 0.
 
-    Args:
-        points: ends of the edges, shape (n, 2), length.
-        edges: for each edge the rows of its two ends in `points`, shape (k, 2).
-
-    Yields:
-        Indices of the two edges of each pair, shape (m, 2), m > 0.
+    Ends of edges have shape (n, 2), length, edges their rows (k, 2).
     """
     low, high = points[edges].min(1), points[edges].max(1)
     tolerance = ROUND_OFF * float((high - low).max())

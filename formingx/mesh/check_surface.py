@@ -12,19 +12,10 @@ _FOLD = -0.9
 
 
 def check_surface(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """Check the triangles of a surface in the reference configuration.
+    """Raise an InputError, with the position, for invalid triangles of a surface; a flat one is checked in its plane.
 
-    A flat surface is checked in its own plane, so elements that lie over each other are found.
-
-    Args:
-        points: nodes (x, y, z), shape (n, 3), length.
-        triangles: node numbers, shape (m, 3).
-        what: name of the mesh, with which the message begins.
-
-    Raises:
-        InputError: a coordinate is not finite, an element is flat, more than two elements share an edge, or neighbours
-            look to different sides or are folded onto each other. Two nodes lie at one place, or the surface is in
-            pieces. The message gives the position.
+    Nodes have shape (n, 3), length, triangles (m, 3). Elements must not be flat or folded, two may share an edge, and
+    the surface is in one piece without coincident nodes.
     """
     middle = points.mean(0)
     plane = np.linalg.svd(points - middle, full_matrices=False)[2] if np.isfinite(points).all() else np.eye(3)

@@ -68,9 +68,5 @@ void cross(long pairs, const long *first, const long *second, const double *poin
 
 
 def compiled() -> Any:
-    """Return an object with two functions in C, compiled at the first call.
-
-    `overlaps` counts the pairs of boxes that overlap or touch, and writes their indices to an array. `cross` finds the
-    pairs of edges that cross, or touch anywhere but in a common node.
-    """
+    """Return C functions: `overlaps` of boxes, and `cross` of edges off common nodes, with their indices."""
     return functions("mesh", _HEADER, _SOURCE)

@@ -93,12 +93,6 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
     """Return a mesh of the same body with short columns of elements at the fillets of its tools.
 
     The mesh itself is returned if the script gave its elements, if it was deformed, or if it is no thin sheet.
-
-    Args:
-        mesh: mesh from `disc` or `parison`.
-        contacts: contacts of the scene, with `on`, `tool` and `direction`.
-        axisymmetric: True for bodies of revolution, False in plane strain.
-        keep_through: True for at least as many elements through each layer as the mesh has.
     """
     preset, columns = mesh.preset, mesh.columns
     if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
@@ -134,16 +128,8 @@ def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[Fillet
                      constrained: list[float], thickness: float, fineness: Fineness) -> tuple[np.ndarray, int]:
     """Return the largest lengths of columns, shape (n,), and the number of elements through the sheet.
 
-    They are those with the fewest unknowns among all whose estimated error is small enough on every fillet. If there
-    are none, the number of elements through the sheet is the largest.
-
-    Args:
-        s: lengths along the sheet from its start to n points, shape (n,), length.
-        size: largest lengths of columns without fillets and constrained ends, shape (n,), length.
-        fillets: each fillet, False for a lip beside a constrained end, and the distances of the points, shape (n,).
-        constrained: lengths along the sheet from its start to its constrained ends.
-        thickness: thickness of the sheet, length.
-        fineness: sizes of the elements.
+    They have the fewest unknowns with a small enough estimated error on every fillet, given as (fillet, False for a lip
+    at a constrained end, distances (n,)). s, `size` and thickness are lengths.
     """
     choices, longest = [], s[-1] / fineness.along
     for through in range(1, fineness.max_through + 1):
@@ -164,15 +150,7 @@ def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[Fillet
 
 
 def _sharp_fillet(item: Any, fillet: FilletInSheet, thickness: float, accuracy: str, fineness: Fineness) -> str:
-    """Return the text of the finding about a fillet that is sharper than the wall on it is thick.
-
-    Args:
-        item: the contact.
-        fillet: the fillet.
-        thickness: thickness of the sheet, length.
-        accuracy: "draft", "standard" or "fine".
-        fineness: sizes of the elements of this accuracy.
-    """
+    """Return the text of the finding about a fillet that is sharper than the wall on it is thick."""
     return (f"on a fillet of {item.name or item.on!r} of radius {fillet.radius:.4g} the wall, about"
             f" {thickness * fillet.area_ratio:.3g}, is thicker than the radius: there its error may exceed the"
             f" {fineness.promised:.1%} of accuracy = {accuracy!r}. Compare a run with accuracy = 'fine', or give more"
@@ -193,26 +171,13 @@ def is_thick_sheet(mesh: Mesh) -> bool:
 
 
 def _distance(s: np.ndarray, fillet: FilletInSheet, flat: bool) -> np.ndarray:
-    """Return the distance along the sheet from points to the part that may lie on a fillet, shape (n,), length.
-
-    It is 0 within this part.
-
-    Args:
-        s: lengths along the sheet from its start to the points, shape (n,), length.
-        fillet: the fillet.
-        flat: True for a sheet that is flat in the reference configuration.
-    """
+    """Return the distance along a sheet from points s, (n,), to the part that may lie on a fillet, (n,), length."""
     error = _POSITION_ERROR * s[-1]
     return np.maximum(np.maximum(fillet.first - (2 if flat else 3) * error - s, s - fillet.last - error), 0.0)
 
 
 def _bend(fillet: FilletInSheet, thickness: float) -> float:
-    """Return the wall over the radius of a fillet, at most the angle of the arc: the wall bridges shorter arcs.
-
-    Args:
-        fillet: the fillet.
-        thickness: thickness of the sheet, length.
-    """
+    """Return the wall over the radius of a fillet, at most the angle of the arc: it bridges shorter arcs."""
     return float(min(thickness * fillet.area_ratio / fillet.radius, np.arccos(1 - fillet.turn)))
 
 
@@ -227,11 +192,7 @@ def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside
     The second error is that of a convex fillet over which the sheet is drawn. A wall thicker than the radius counts as
     one as thick as the radius: such an edge is reported.
 
-    Args:
-        fillet: the fillet.
-        thickness: thickness of the sheet, length.
-        through: number of elements through the sheet.
-        inside: False for a lip beside a constrained end.
+    `through` is n, and `inside` is False for a lip beside a constrained end.
     """
     relative = min(_bend(fillet, thickness), 1.0) / max(fillet.area_ratio, 1e-6)
     error = _THROUGH * relative / fillet.stretch / through**1.75
@@ -249,9 +210,7 @@ def _column_length(fillet: FilletInSheet, error: float) -> float:
 
     on a concave fillet, and the second one on a convex fillet (symbols as in `_error_through`).
 
-    Args:
-        fillet: the fillet.
-        error: relative error of the wall.
+    The error is relative to the wall.
     """
     change = max(fillet.wall_change, _MIN_WALL_CHANGE)
     relative = np.sqrt(error / (_ALONG_CONVEX * change))
@@ -269,11 +228,7 @@ def _on_flats(flats: FlatsInSheet, s: np.ndarray, thickness: float, error: float
 
     with the radius rho of the free surface when the sheet touches.
 
-    Args:
-        flats: points of the sheet that touch.
-        s: lengths along the sheet from its start to the points, shape (n,), length.
-        thickness: thickness of the sheet, length.
-        error: relative error of the wall.
+    Lengths s along the sheet, thickness h and the error, relative to the wall, are given.
     """
     if not len(flats.positions):
         return np.full(len(s), np.inf)
@@ -282,13 +237,7 @@ def _on_flats(flats: FlatsInSheet, s: np.ndarray, thickness: float, error: float
 
 
 def _through_layers(preset: Preset, through: int, keep: bool) -> list[int]:
-    """Return the numbers of elements through the layers, in proportion to their thickness.
-
-    Args:
-        preset: accuracy and layers of the mesh.
-        through: number of elements through the whole sheet.
-        keep: True for at least as many elements through each layer as the mesh has.
-    """
+    """Return elements through each layer by its thickness; `keep`: at least as many as the mesh has."""
     share = preset.thickness / preset.thickness.sum()
     minimum = np.array(preset.through if keep else np.ones(len(share)))
     return np.maximum(np.ceil(through * share - 1e-9), minimum).astype(int).tolist()

@@ -14,20 +14,10 @@ Thickness = float | Callable[[float], float] | Mapping[float, float]
 
 
 def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str, Callable]:
-    """Return the thickness of each layer as a function of coordinates.
+    """Return {layer: function of coordinates (n,), that returns its thickness, shape (n,), length}.
 
-    Args:
-        kind: name of the calling function, for error messages.
-        thickness: argument of that function: a thickness or {layer name: thickness}. A thickness is a length, a
-            function of the coordinate, or a table {coordinate: length}.
-        alone: name of the layer if `thickness` names none.
-        coordinate: coordinate along which the thickness may vary, "R" or "Z"; "" if it must be constant.
-
-    Returns:
-        {name of a layer: function of coordinates, shape (n,), that returns its thickness, shape (n,), length}.
-
-    Raises:
-        InputError: there is no layer, or a name or a thickness is not allowed.
+    `thickness` is a length, function or table, or {layer: such}; `coordinate` is "R", "Z", or "" if it must be
+    constant. Other values are an InputError.
     """
     named = isinstance(thickness, Mapping) and all(isinstance(name, str) for name in thickness)
     layers = dict(thickness) if named else {alone: thickness}
@@ -39,14 +29,8 @@ def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) ->
 def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray], np.ndarray]:
     """Return the thickness of a layer as a function of coordinates, shape (n,), with values of this shape, length.
 
-    Args:
-        caller: name of the thickness, for messages.
-        given: a length, a function of a coordinate, or a table {coordinate: length}.
-        coordinate: name of the coordinate along which the thickness may vary; "" if it must be constant.
-
-    Raises:
-        InputError: the thickness is not positive. It varies although it must be constant. The returned function also
-            raises it: at a coordinate without a value.
+    `given` is a length, function or table {coordinate: length}. An InputError, also of the function, reports a value
+    that is missing or not positive.
     """
     if not coordinate or not (callable(given) or isinstance(given, Mapping)):
         value = positive(caller, given)
@@ -68,16 +52,9 @@ def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray
 
 
 def _call(function: Callable, v: float, caller: str, coordinate: str) -> Any:
-    """Return the thickness that the user's function gives at coordinate `v`.
+    """Return the thickness by a user's function at coordinate `v`.
 
-    Args:
-        function: the user's function.
-        v: its argument.
-        caller: name of the thickness, for messages.
-        coordinate: name of the coordinate, for messages.
-
-    Raises:
-        InputError: the function raises an error.
+    An error in it is an InputError that names the thickness and the coordinate.
     """
     try:
         return function(v)
@@ -87,14 +64,9 @@ def _call(function: Callable, v: float, caller: str, coordinate: str) -> Any:
 
 
 def checked_grading(kind: str, grading: Any) -> float:
-    """Return the argument `grading` as a float.
+    """Return the size of the last over the first element as a float.
 
-    Args:
-        kind: name of the calling function, for error messages.
-        grading: size of the last element over the size of the first.
-
-    Raises:
-        InputError: `grading` is not between 1e-6 and 1e6.
+    It must lie between 1e-6 and 1e6, otherwise an InputError says so.
     """
     grading = positive(f"{kind}: grading", grading)
     if not 1e-6 <= grading <= 1e6:
@@ -103,20 +75,10 @@ def checked_grading(kind: str, grading: Any) -> float:
 
 
 def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[np.ndarray]]:
-    """Return the number of elements along a sheet, and the ends of the elements through each layer.
+    """Return the number of elements along a sheet, and the ends of the elements through each layer on [0, 1].
 
-    Args:
-        kind: name of the calling function, for error messages.
-        along_what: direction along the sheet, such as "radius", for error messages.
-        elements: argument of that function: (number along the sheet, division of the layers). The division is a number
-            of elements through each layer, or a list with an entry for each layer: a number, or relative sizes.
-        layers: number of layers.
-
-    Returns:
-        The number; for each layer the ends on [0, 1] of its n elements, shape (n + 1,).
-
-    Raises:
-        InputError: `elements` has another form, or there are too many elements.
+    `elements` is (number, division), where the division is a number for all layers, or a number or relative sizes for
+    each. Another form or too many elements are an InputError.
     """
     if not is_sequence(elements) or len(elements) != 2:
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
@@ -136,12 +98,7 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
 def _layer_ends(kind: str, given: Any) -> np.ndarray:
     """Return the ends of the n elements through a layer on [0, 1], shape (n + 1,).
 
-    Args:
-        kind: name of the calling function, for messages.
-        given: number of the elements, or their relative sizes.
-
-    Raises:
-        InputError: a size is not positive.
+    `given` is their number or relative sizes, which must be positive.
     """
     if not is_sequence(given):
         n = count(f"{kind}: elements through a layer", given)
@@ -165,10 +122,6 @@ def graded_ends(along: int, grading: float) -> np.ndarray:
     r"""Return the ends of elements on [0, 1] whose sizes form a geometric progression, shape (along + 1,).
 
     .. math:: h_i \propto g^{i/(n - 1)}, \qquad i = 0, \dots, n - 1
-
-    Args:
-        along: number n of elements.
-        grading: size g of the last element over the size of the first.
     """
     sizes = grading ** (np.arange(along) / max(along - 1, 1))
     ends = np.concatenate([[0.0], np.cumsum(sizes)])
@@ -185,12 +138,7 @@ def with_middles(joints: np.ndarray) -> np.ndarray:
 def levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinates: np.ndarray) -> np.ndarray:
     """Return the distances of all rows of nodes from the first face of a sheet, shape (rows, n), length.
 
-    Rows lie at the ends and in the middles of the elements.
-
-    Args:
-        layers: {name: function of coordinates, shape (n,), that returns the thickness of the layer, shape (n,)}.
-        through: ends of the elements through each layer on [0, 1].
-        coordinates: coordinates along the sheet, shape (n,).
+    Rows lie at the ends and middles of elements; coordinates have shape (n,).
     """
     rows = [np.zeros(len(coordinates))]
     for thickness_at, ends in zip(layers.values(), through):

@@ -4,15 +4,9 @@ import numpy as np
 
 
 def edges_of(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return the edges of triangles, and the number of triangles at each edge.
+    """Return all edges (3 m, 2) of triangles (m, 3), distinct ones (k, 2), their numbers (3 m,), and counts (k,).
 
-    Args:
-        triangles: vertex numbers of m triangles, shape (m, 3).
-
-    Returns:
-        Edges of all triangles in the order of their vertices, the first of each triangle first, shape (3 m, 2). Then
-        the k distinct edges with ascending vertex numbers, shape (k, 2). Then the number of the distinct edge for each
-        of the 3 m edges, shape (3 m,). Last the number of triangles at each distinct edge, shape (k,).
+    Edges of a triangle follow its vertices; distinct ones ascend, and have the number of triangles.
     """
     directed = np.concatenate([triangles[:, [i, (i + 1) % 3]] for i in range(3)])
     low, high = np.sort(directed, axis=1).T.astype(np.int64)

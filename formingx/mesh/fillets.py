@@ -75,11 +75,7 @@ class _Touched(NamedTuple):
     reference_radii: np.ndarray
 
     def stretches(self, axisymmetric: bool, group: np.ndarray) -> tuple[float, float]:
-        """Return reference over deformed length along the section and over deformed area, at a group of points.
-
-        Args:
-            axisymmetric: True for bodies of revolution, False in plane strain.
-            group: numbers of the points, consecutive.
+        """Return reference over deformed length in the section and over deformed area, of consecutive points `group`.
         """
         along = length_along(self.points)
         before, after = max(group[0] - 1, 0), min(group[-1] + 1, len(along) - 1)
@@ -89,12 +85,7 @@ class _Touched(NamedTuple):
         return stretch, stretch * (mean[0] / max(mean[1], 1e-300) if axisymmetric else 1.0)
 
     def wall_change(self, axisymmetric: bool, group: np.ndarray) -> float:
-        """Return the absolute change of the logarithm of the wall over a group of points.
-
-        Args:
-            axisymmetric: True for bodies of revolution, False in plane strain.
-            group: numbers of the points, consecutive.
-        """
+        """Return the absolute change of the logarithm of the wall over consecutive points `group`."""
         sides = np.clip([group[0] - 2, group[-1] + 2], 0, len(self.points) - 1)      # their neighbours are outside, too
         before, after = (max(self.stretches(axisymmetric, side)[1], 1e-9) for side in sides[:, None])
         return float(abs(np.log(after / before)))
@@ -115,13 +106,9 @@ is 1.)"""
 
 
 def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bool) -> Iterator[FilletInSheet]:
-    """Yield the fillets of a tool that a sheet may reach, with the part of the sheet on each.
+    """Yield the fillets of a section tool that a sheet may reach, with the part of the sheet on each.
 
-    Args:
-        tool: a tool in the plane of the section (`formingx.tools.tool`).
-        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
-        axisymmetric: True for bodies of revolution, False in plane strain.
-        moving: True if the tool moves, by an unknown amount.
+    The undeformed face has points (R, Z), shape (n, 2), length. A `moving` tool moves by an unknown amount.
     """
     s = length_along(face)
     if moving:
@@ -146,12 +133,9 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
 
 
 def flats_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool) -> FlatsInSheet:
-    """Return the points of a sheet that may touch the straight pieces of a tool at rest.
+    """Return the points of a sheet that may touch the straight pieces of a fixed section tool.
 
-    Args:
-        tool: a tool of a section.
-        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
-        axisymmetric: True for bodies of revolution, False in plane strain.
+    The undeformed face has points (R, Z), shape (n, 2), length.
     """
     found = _touched(tool, face)
     straight = np.flatnonzero(found.curvature == 0)
@@ -163,12 +147,7 @@ def flats_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool) -> FlatsInSh
 
 
 def _touched(tool: Any, face: np.ndarray) -> _Touched:
-    """Return an estimate of the material points that will touch the points of a tool, which does not move.
-
-    Args:
-        tool: a tool of a section.
-        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
-    """
+    """Return an estimate of the material of a face, (n, 2), length, that will touch points of a fixed tool."""
     s = length_along(face)
     x, normal, curvature = _surface(tool, face, s[-1])
     if len(x) < 2:
@@ -179,16 +158,9 @@ def _touched(tool: Any, face: np.ndarray) -> _Touched:
 
 
 def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return points of the tool opposite the sheet, ordered along the sheet.
+    """Return points of a section tool along a sheet, (m, 2), normals into it, (m, 2), and curvatures, (m,).
 
-    Args:
-        tool: a tool of a section.
-        face: points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
-        length: length of the sheet, length.
-
-    Returns:
-        Points, shape (m, 2), length; normals into the tool, shape (m, 2); absolute curvatures of the tool, shape (m,),
-        1/length.
+    Curvatures are absolute, 1/length; the undeformed face has points (n, 2), and `length` is that of the sheet.
     """
     outline = tool.surface()[0]
     pieces = np.diff(outline, axis=0)
@@ -217,13 +189,9 @@ def _groups(curvature: np.ndarray) -> list[np.ndarray]:
 
 
 def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) -> np.ndarray:
-    """Return the radius of the largest ball outside the tool that touches it at each point, shape (m,), length.
+    """Return the radius of the largest ball outside the tool at points x, (m, 2), shape (m,), length.
 
-    Args:
-        tool: a tool of a section.
-        x: points of the tool, shape (m, 2), length.
-        normal: normals into the tool there, shape (m, 2).
-        largest: upper bound of the radii, length.
+    Normals into the tool have shape (m, 2); `largest` bounds the radii.
     """
     low: np.ndarray = np.zeros(len(x))
     high: np.ndarray = np.full(len(x), largest)
@@ -237,15 +205,8 @@ def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) ->
 def _positions(x: np.ndarray, free: np.ndarray, face: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Return the positions along the undeformed sheet of the material that touches a tool, shape (m,), length.
 
-    The radius of the free surface decreases. A point of the tool is touched when this radius equals the radius of the
-    largest ball outside the tool that touches the tool there (`free`). Each free part of the sheet is an arc of the
-    present radius. It stretches evenly between the points at its ends, which stick.
-
-    Args:
-        x: points of the tool in order along the sheet, shape (m, 2), length.
-        free: radius of the largest ball outside the tool that touches each point, shape (m,), length.
-        face: n points (R, Z) of the undeformed face along the sheet, shape (n, 2), length.
-        s: length along the face from its start to these n points, shape (n,), length.
+    A tool point x, (m, 2), is touched when the radius of the free surface equals its ball `free`, (m,). Each free part
+    of the face (n, 2) is an arc and stretches evenly between sticking ends.
     """
     points = np.concatenate([face[:1], x, face[-1:]])
     on_axis = [(end, neighbour) for end, neighbour in ((0, 1), (-1, -2)) if face[end, 0] <= 1e-9 * s[-1]]

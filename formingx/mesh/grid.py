@@ -41,12 +41,7 @@ class Grid(NamedTuple):
 
 
 def counter_clockwise(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return triangles with their nodes in counter-clockwise order, shape (m, 3 or 6).
-
-    Args:
-        points: nodes (R, Z), shape (n, 2), length.
-        triangles: node numbers, shape (m, 3 or 6): corners, then middles of edges 01, 12, 20.
-    """
+    """Return triangles (m, 3 or 6), corners then middles, with their nodes in counter-clockwise order."""
     triangles = np.array(triangles)
     a, b, c = (points[triangles[:, k]] for k in range(3))
     wrong = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0] < 0
@@ -98,18 +93,9 @@ def gathered(mesh: Mesh) -> Grid:
 
 
 def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
-    """Return the distributed mesh of a grid; collective.
+    """Return the distributed mesh of the grid that `make` returns on rank 0; collective.
 
-    Args:
-        make: function that returns the grid; rank 0 calls it and checks the grid.
-        comm: MPI communicator.
-        what: name of the mesh, for error messages.
-
-    Returns:
-        The mesh, distributed over the ranks of `comm`.
-
-    Raises:
-        InputError: `make` raised it, or the elements are invalid. All ranks raise it.
+    Invalid elements, or its own InputError, raise an InputError on all ranks, with the name `what`.
     """
     error, shape = None, None
     if comm.rank == 0:
@@ -133,19 +119,9 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
 def _tagged(grid: Grid, what: str) -> tuple:
     """Return the arrays of a grid with its names as tags, in the order of nodes of DOLFINx.
 
-    An edge of several boundaries has a tag of its own, which belongs to all of these boundaries.
-
-    Args:
-        grid: the grid.
-        what: name of the mesh, for messages.
-
-    Returns:
-        Cells, shape (m, 3 or 6); points, shape (n, 2 or 3), length; tags of the cells, shape (m,); boundary edges,
-        shape (k, 2 or 3); tags of the edges, shape (k,); {layer: tag}; {boundary: tags}.
-
-    Raises:
-        InputError: the elements are invalid, an element belongs to two layers, or a boundary edge is not an edge of an
-            element.
+    They are cells (m, 3 or 6), points (n, 2 or 3), length, cell tags (m,), edges (k, 2 or 3), edge tags (k,), {layer:
+    tag} and {boundary: tags}; an edge of several boundaries has its own tag. Invalid elements, layers or edges are an
+    InputError.
     """
     triangles = np.concatenate(list(grid.layers.values()))
     used = np.unique(triangles)
@@ -194,18 +170,10 @@ def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
 
 def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
                    points: np.ndarray) -> list[list[int]]:
-    """Return [first end, last end, middle] of each boundary edge, as node numbers; [] if no edge is part of an element.
+    """Return [first end, last end, middle] of each boundary edge (k, 2), as node numbers; [] if all are foreign.
 
-    Edges of three-node triangles have no middle. A curve outside the body, such as a tool in the same file, gives [].
-
-    Args:
-        edges: node numbers of the ends of the edges, shape (k, 2); -1 for a node of no element.
-        known: {(lower, higher node number of the ends): [node number of the middle]} of all edges of elements.
-        caller: beginning of the message.
-        points: nodes (R, Z), shape (n, 2), length, for the message.
-
-    Raises:
-        InputError: some edges belong to elements, others do not.
+    `known` maps the sorted ends of element edges to [middle]; curves outside, such as tools, give []. Only some in
+    elements is an InputError.
     """
     pairs = [(int(a), int(b)) for a, b in edges]
     found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in pairs if (min(a, b), max(a, b)) in known]

@@ -28,22 +28,10 @@ class LocatedPoints(NamedTuple):
 
 def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None = None, within: str = "mesh"
            ) -> LocatedPoints:
-    """Find the cell that contains each of the given points; collective.
+    """Return the points that lie in cells of this rank, each found once; collective.
 
-    A point counts as inside up to 0.001 cell sizes from a cell. A point on several cells or ranks is found once.
-
-    Args:
-        mesh: the `dolfinx.mesh.Mesh`.
-        points: reference positions (R, Z), or (x, y, z), shape (n, 2 or 3), length, equal on all ranks.
-        size: extent of the mesh, length.
-        cells: local numbers of the cells to be searched; None: all.
-        within: name of these cells in the error message.
-
-    Returns:
-        The points that lie in cells of this rank.
-
-    Raises:
-        InputError: a point lies in none of the cells.
+    Points are reference positions (n, 2 or 3), length, equal on all ranks; inside is up to 0.001 cell sizes from one of
+    the cells (None: all). A point in none is an InputError.
     """
     comm, X, cmap, dim = mesh.comm, mesh.geometry.x, _compat.coordinate_map(mesh), mesh.topology.dim
     nodes, owned = _compat.cell_nodes(mesh), own_cells(mesh)

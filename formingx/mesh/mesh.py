@@ -179,16 +179,9 @@ class Mesh:
                        columns=self._columns_with_part((low, high), axis, tolerance, part))
 
     def _columns_with_part(self, limits: tuple, axis: int, tolerance: float, part: tuple) -> Columns | None:
-        """Return the `Columns` of the mesh, in which columns must end at the limits of a new part of a boundary.
+        """Return the `Columns` of the mesh, which end at the limits of a new part of a boundary; None without columns.
 
-        Args:
-            limits: lowest and highest coordinate of the part, length.
-            axis: 0 for R, 1 for Z.
-            tolerance: largest distance of an end from a limit, length.
-            part: arguments of `with_part`: (name, of, within, along).
-
-        Returns:
-            The columns; None if the mesh has none.
+        The axis is 0 for R, 1 for Z; limits and tolerance are lengths; `part` has the arguments of `with_part`.
         """
         if self.columns is None:
             return None

@@ -62,8 +62,7 @@ class Content(NamedTuple):
 def content(file: str | os.PathLike) -> Content:
     """Return nodes, elements and names of a gmsh file (MSH 2.2 or 4.1, text or binary).
 
-    Raises:
-        InputError: the file cannot be read, or is in none of the formats; the message names the section.
+    An InputError names the section of an unreadable file.
     """
     file = os.fspath(file)
     try:
@@ -104,9 +103,7 @@ def content(file: str | os.PathLike) -> Content:
 def read(file: str | os.PathLike) -> Grid:
     """Return the grid in a gmsh file; physical groups name the layers (dimension 2) and the boundaries (dimension 1).
 
-    Raises:
-        InputError: the file is missing or damaged. There is no physical group of dimension 2, an element is not a
-            triangle, or six-node triangles are not in a plane of constant z.
+    A damaged file, no group of dimension 2, elements other than triangles, or ones out of the plane are an InputError.
     """
     file = os.fspath(file)
     found = content(file)
@@ -159,20 +156,10 @@ def write(grid: Grid, file: str | os.PathLike) -> None:
 
 
 def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray, file: str) -> dict[str, np.ndarray]:
-    """Return {name of a physical group: its elements} for one dimension.
+    """Return {name of a physical group: its elements, (m, nodes)} for one dimension.
 
-    Args:
-        found: content of the file.
-        dim: dimension of the elements, 1 or 2.
-        kinds: {gmsh's number of an allowed element type: number of nodes}.
-        numbers: sorted node numbers, shape (n,).
-        file: name of the file, for messages.
-
-    Returns:
-        Elements of each group as indices into `numbers`, shape (m, nodes).
-
-    Raises:
-        InputError: an element is of another type, or refers to a missing node.
+    Elements are indices into the sorted node `numbers`, (n,). Another type than in `kinds`, {gmsh type: nodes}, or a
+    missing node is an InputError.
     """
     parts: dict[str, list[np.ndarray]] = {}
     what = "triangles" if dim == 2 else "edges"
@@ -201,8 +188,7 @@ def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray,
 def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
     """Yield the names and contents of the sections of a file with the content `data`.
 
-    Raises:
-        InputError: a section has no end, or there is content outside the sections.
+    A section without end, or content outside, is an InputError.
     """
     begin, offset = re.compile(rb"\s*\$(\w{1,40})[ \t]*\r?\n"), 0
     while match := begin.match(data, offset):
@@ -217,12 +203,9 @@ def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
 
 
 def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
-    """Return the format of a file from its section $MeshFormat.
+    """Return (version, True if binary, byte order "<" or ">", bytes of a count) from the section $MeshFormat.
 
-    The result is (version, True if binary, byte order "<" or ">", number of bytes of a count: 4 or 8).
-
-    Raises:
-        InputError: the version is not supported.
+    A count has 4 or 8 bytes. Another version is an InputError.
     """
     words = body.split(b"\n")[0].decode("ascii", "replace").split()
     if len(words) != 3 or words[0] not in ("2.2", "4.1") or words[1] not in ("0", "1") or words[2] not in ("4", "8"):
@@ -240,8 +223,7 @@ def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
 def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
     """Return {(dimension, number of a group): name} from the section $PhysicalNames.
 
-    Raises:
-        InputError: a line has another form, or a group has two names.
+    A line of another form, or a group with two names, is an InputError.
     """
     lines = [line for line in body.decode("utf-8", "replace").splitlines() if line.strip()]
     names: dict[tuple[int, int], str] = {}
@@ -274,8 +256,7 @@ def _nodes_2(section: Section) -> tuple[np.ndarray, np.ndarray]:
 def _elements_2(section: Section) -> list[Block]:
     """Return a block for each (element type, group, entity) from the section $Elements of an MSH 2.2 file.
 
-    Raises:
-        InputError: an element type is unknown.
+    An unknown element type is an InputError.
     """
     found: dict[tuple[int, int, int], list] = {}
     n, done = section.line() if section.binary else checked_count(section.ints(1), section), 0
@@ -298,11 +279,7 @@ def _elements_2(section: Section) -> list[Block]:
 def _groups(section: Section, whole: dict | None = None) -> dict[tuple[int, int], tuple[int, ...]]:
     """Return {(dimension, entity): numbers of its physical groups} from a section of an MSH 4.1 file.
 
-    An entity is a point, curve, surface or volume of the geometry. A part of an entity is in the groups of the whole.
-
-    Args:
-        section: the section $Entities or $PartitionedEntities.
-        whole: for $PartitionedEntities the result of the section $Entities, else None.
+    A part of an entity, in $PartitionedEntities, is in the groups of the `whole`, the result of $Entities.
     """
     found = {}
     if whole is not None:
@@ -342,17 +319,7 @@ def _nodes_4(section: Section) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _check_total(section: Section, what: str, total: int, parts: list[np.ndarray]) -> None:
-    """Check that a section ends, and contains as many nodes or elements as its first line states.
-
-    Args:
-        section: the section.
-        what: "nodes" or "elements", for messages.
-        total: number from the first line.
-        parts: nodes or elements of each block, arrays of any length.
-
-    Raises:
-        InputError: the numbers differ.
-    """
+    """Raise an InputError unless a section ends, and its parts have the stated total."""
     section.end()
     if (found := sum(map(len, parts))) != total:
         raise InputError(f"{section.where}: {found} {what}, but its first line says {total}")
@@ -361,12 +328,7 @@ def _check_total(section: Section, what: str, total: int, parts: list[np.ndarray
 def _elements_4(section: Section, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
     """Return the blocks of elements from the section $Elements of an MSH 4.1 file.
 
-    Args:
-        section: the section.
-        groups: {(dimension, entity): numbers of its physical groups}.
-
-    Raises:
-        InputError: an element type is unknown.
+    Groups are {(dimension, entity): numbers of physical groups}; an unknown element type is an InputError.
     """
     blocks = []
     number, total, *_ = section.sizes(4)

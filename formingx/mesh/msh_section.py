@@ -11,12 +11,7 @@ from ..errors import InputError
 class Section:
     """Reader of the numbers in a section of a gmsh file.
 
-    Args:
-        body: content of the section.
-        binary: True in a binary file.
-        order: byte order, "<" or ">".
-        width: number of bytes of a count, and in MSH 4.1 of a node or element number, 4 or 8.
-        where: name of the section, for error messages.
+    The byte order is "<" or ">", and a count has a width of 4 or 8 bytes. Messages have the name `where`.
     """
 
     def __init__(self, body: bytes, binary: bool, order: str, width: int, where: str):
@@ -36,10 +31,9 @@ class Section:
         return self._binary
 
     def line(self) -> int:
-        """Return the count on the next line of text, with which a section of a binary MSH 2.2 file begins.
+        """Return the count on the next line, which begins a section of a binary MSH 2.2 file.
 
-        Raises:
-            InputError: there is no such line.
+        A missing line is an InputError.
         """
         end = self._body.find(b"\n", self._offset)
         word = self._body[self._offset:end].strip()
@@ -65,28 +59,20 @@ class Section:
         return self.whole(self._take(n, f"u{self._width}"))
 
     def end(self) -> None:
-        """Check that all numbers of the section were read.
-
-        Raises:
-            InputError: numbers are left over.
-        """
+        """Raise an InputError if numbers of the section were left over."""
         remaining = len(self._body[self._offset:].strip()) if self._binary else len(self._values) - self._offset
         if remaining:
             raise InputError(f"{self.where}: {remaining} more {'bytes' if self._binary else 'numbers'} follow what its"
                              f" counts announce")
 
     def records(self, n: int, fields: list) -> np.ndarray:
-        """Return the next n records of a binary section, a structured array, shape (n,).
-
-        fields: (name, type without byte order, shape) of each entry of a record.
-        """
+        """Return the next n records of a binary section, shape (n,), of fields (name, type, shape)."""
         return self._bytes(n, np.dtype([(name, self._order + kind, shape) for name, kind, shape in fields]))
 
     def _take(self, n: int, kind: str) -> np.ndarray:
         """Return the next n numbers of a type, such as "f8", shape (n,); in text files all numbers are floats.
 
-        Raises:
-            InputError: the section is too short.
+        A section that is too short is an InputError.
         """
         if self._binary:
             return self._bytes(n, np.dtype(self._order + kind))
@@ -98,8 +84,7 @@ class Section:
     def _bytes(self, n: int, kind: np.dtype) -> np.ndarray:
         """Return the next n numbers or records of a type in a binary section, shape (n,).
 
-        Raises:
-            InputError: the section is too short.
+        A section that is too short is an InputError.
         """
         if n * kind.itemsize > len(self._body) - self._offset:
             raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
@@ -108,10 +93,9 @@ class Section:
         return found
 
     def whole(self, values: np.ndarray) -> np.ndarray:
-        """Return floats with integral values as integers, of the shape of `values`.
+        """Return floats with integral values as integers, of the same shape.
 
-        Raises:
-            InputError: a number is not an integer.
+        Any other number is an InputError.
         """
         with np.errstate(invalid="ignore"):
             whole = np.abs(values) < 2.0**53
@@ -122,11 +106,7 @@ class Section:
 
 
 def checked_count(found: Sequence[int] | np.ndarray, section: Section) -> int:
-    """Return the first of the numbers `found` as a count of items in the section.
-
-    Raises:
-        InputError: the count is negative or too large.
-    """
+    """Return the first of the numbers `found` as a count of items; InputError if negative or too large."""
     n = int(found[0])
     if not 0 <= n < 2**40:
         raise InputError(f"{section.where}: a count is {n}")
@@ -134,11 +114,7 @@ def checked_count(found: Sequence[int] | np.ndarray, section: Section) -> int:
 
 
 def checked_dimension(dim: int, section: Section) -> int:
-    """Return the dimension `dim` of an entity, checked; `section` gives the name for the error message.
-
-    Raises:
-        InputError: the dimension is not between 0 and 3.
-    """
+    """Return the dimension `dim` of an entity; InputError unless it is between 0 and 3."""
     if not 0 <= dim <= 3:
         raise InputError(f"{section.where}: a dimension is {dim}")
     return dim

@@ -25,14 +25,9 @@ def axes(domain: Any) -> str:
 
 
 def arguments(function: Callable, coordinates: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the coordinates that a function of the reference position takes.
+    """Return the coordinates, {name: values (n,), length}, that a function of the reference position takes.
 
-    Args:
-        function: function of arrays (R, Z); in three dimensions of (x, y) or (x, y, z).
-        coordinates: {name: values, shape (n,), length} of all coordinates.
-
-    Returns:
-        {name: values} of the first coordinates, as many as the function has positional arguments without a default.
+    They are the first ones, as many as it has positional arguments without a default.
     """
     try:
         taken = list(inspect.signature(function).parameters.values())
@@ -55,15 +50,7 @@ def node_positions(domain: Any) -> np.ndarray:
 
 
 def span(domain: Any, comm: Any) -> np.ndarray:
-    """Return the lowest and highest reference coordinates of all nodes of a DOLFINx mesh; collective.
-
-    Args:
-        domain: the mesh.
-        comm: MPI communicator.
-
-    Returns:
-        Lowest, then highest coordinates, shape (2, 2 or 3), length, equal on all ranks.
-    """
+    """Return the lowest and highest reference coordinates of all nodes, shape (2, 2 or 3), length; collective."""
     X = node_positions(domain)
     return np.array([[comm.allreduce(f(X[:, i], initial=-sign * np.inf), op) for i in range(X.shape[1])]
                      for f, sign, op in ((np.min, -1, MPI.MIN), (np.max, 1, MPI.MAX))])
@@ -75,15 +62,7 @@ def dof_positions(space: Any) -> np.ndarray:
 
 
 def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the distance from each place to the nearest point, and the index of this point.
-
-    Args:
-        points: coordinates of n points in d dimensions, shape (n, d), length.
-        places: coordinates of the places, shape (..., d), length.
-
-    Returns:
-        Distances, shape (...,), length, and row indices of `points`, shape (...,).
-    """
+    """Return the distance from places, (..., d), to the nearest of points (n, d), and its index, both (...,)."""
     if len(points) * places.size > MAX_COMPARED:
         from scipy.spatial import cKDTree
         return cKDTree(points).query(places)
@@ -93,29 +72,14 @@ def nearest(points: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
-    """Return the coordinates of a point, with 0 in place of round-off.
-
-    Args:
-        point: the coordinates, length.
-        points: coordinates of points of the body, any shape, length; their range is the scale of round-off.
-
-    Returns:
-        The coordinates. Those with a magnitude of at most 1e-12 times that range are 0.
-    """
+    """Return the coordinates of a point, with 0 for up to 1e-12 times the range of points of the body, length."""
     return tuple(float(x) if abs(x) > 1e-12 * np.ptp(points) else 0.0 for x in point)
 
 
 def matching_rows(points: np.ndarray, stored: Any, tolerance: float, message: str) -> np.ndarray:
-    """Return the row of stored positions that coincides with each point, shape (n,).
+    """Return the row of stored positions (m, d) that coincides with each point (n, d), shape (n,).
 
-    Args:
-        points: reference positions of n points, shape (n, d), length.
-        stored: m stored positions, array or nested list with m * d numbers, length.
-        tolerance: largest distance between a point and its stored position, length.
-        message: text of the error.
-
-    Raises:
-        InputError: a point is farther than `tolerance` from all stored positions.
+    A point farther than `tolerance`, length, from all of them is an InputError with the message.
     """
     stored = np.reshape(stored, (-1, points.shape[-1]))
     if not len(points):                                      # a rank without such points
@@ -129,33 +93,18 @@ def matching_rows(points: np.ndarray, stored: Any, tolerance: float, message: st
 
 
 def cell_node_positions(domain: Any, cells: Any) -> np.ndarray:
-    """Return the positions of the nodes of some cells, corners first, shape (cells, nodes, coordinates), length.
-
-    Args:
-        domain: the DOLFINx mesh.
-        cells: local numbers of the cells.
-    """
+    """Return the node positions of local cells, corners first, shape (cells, nodes, coordinates), length."""
     geometry = domain.geometry
     return geometry.x[np.asarray(_compat.cell_nodes(domain))[cells], :geometry.dim]
 
 
 def facet_node_positions(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the positions of the nodes of some facets, ends first, shape (facets, 2 or 3, coordinates), length.
-
-    Args:
-        domain: the DOLFINx mesh.
-        facets: local numbers of the facets.
-    """
+    """Return the node positions of local facets, ends first, (facets, 2 or 3, coordinates), length."""
     return domain.geometry.x[facet_nodes(domain, facets), :domain.geometry.dim]
 
 
 def facet_nodes(domain: Any, facets: np.ndarray) -> np.ndarray:
-    """Return the nodes of some facets, ends first, as row indices of `domain.geometry.x`, shape (facets, 2 or 3).
-
-    Args:
-        domain: the DOLFINx mesh.
-        facets: local numbers of the facets.
-    """
+    """Return the nodes of local facets, ends first, as rows of `domain.geometry.x`, shape (facets, 2 or 3)."""
     from dolfinx.mesh import entities_to_geometry
     domain.topology.create_connectivity(1, 2)
     domain.topology.create_connectivity(2, 1)

@@ -9,10 +9,7 @@ GROWTH = 0.25
 
 
 def length_along(line: np.ndarray) -> np.ndarray:
-    """Return the length along a polyline from its first point to each of its n points, shape (n,), length.
-
-    line: points of the polyline, shape (n, 2), length.
-    """
+    """Return the length along a polyline (n, 2) from its first point to each of its points, shape (n,), length."""
     return np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(line, axis=0).T))])
 
 
@@ -21,12 +18,7 @@ def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
 
     .. math:: n(s) = \int_0^s \frac{ds'}{h(s')}
 
-    Args:
-        s: length along the sheet to each point, shape (n,), length.
-        size: length h of a column at each point, shape (n,), length.
-
-    Returns:
-        Numbers of columns, shape (n,), by the trapezoidal rule.
+    The trapezoidal rule is used; lengths s and sizes have shape (n,).
     """
     return np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
 
@@ -34,13 +26,8 @@ def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
 def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     """Return the ends of columns of elements with given lengths, as coordinates along the sheet, shape (columns + 1,).
 
-    The coordinate is any number that increases along the sheet, such as the radius of a disc (`Columns.ends`).
-
-    Args:
-        coordinates: coordinates of n points along the sheet, shape (n,).
-        s: length along the sheet from its start to each point, shape (n,), length.
-        size: largest length of a column at each point, shape (n,), length.
-        fixed: ascending coordinates of m ends that must be kept, among them the first and the last, shape (m,).
+    Coordinates, lengths s and largest sizes of columns have shape (n,); `fixed` ends, first and last included, must be
+    kept, (m,).
     """
     number = number_of_columns(s, size)
     marks = np.interp(fixed, coordinates, number)
@@ -52,12 +39,7 @@ def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, fi
 
 
 def moved_nodes(mesh: Any) -> float:
-    """Return the largest displacement of a node of the two faces of a sheet, over the extent of the mesh.
-
-    A script may have moved nodes since the mesh was made.
-
-    mesh: a `Mesh` with `columns`.
-    """
+    """Return the largest displacement, by the script, of a node of the sheet's faces, over the extent of the mesh."""
     columns = mesh.columns
     nodes = np.concatenate(list(columns.place(columns.ends)[[0, -1]]))
     motions = [np.min(np.linalg.norm(nodes[:, None] - mesh.nodes_of(name), axis=2), axis=1).reshape(2, -1)[k].max()

@@ -73,8 +73,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
 def read(file: str | os.PathLike) -> Grid:
     """Return the grid in a text file of `write`; clockwise elements become counter-clockwise.
 
-    Raises:
-        InputError: the file is missing, or does not have the format "six-node triangles"; the message names the line.
+    A missing file, or another format than "six-node triangles", is an InputError with the line.
     """
     lines = _Lines(os.fspath(file))
     *first, version = next(lines, None) or [""]
@@ -125,16 +124,9 @@ def read(file: str | os.PathLike) -> Grid:
 
 
 def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray) -> None:
-    """Check that every boundary edge is an edge of an element.
+    """Raise an InputError unless every boundary edge (k, 3) is an edge of an element (m, 6).
 
-    Args:
-        file: name of the file, for messages.
-        layers: {name: triangles, shape (m, 6)}, indices of their nodes.
-        boundaries: {name: edges, shape (k, 3)}, indices of first, last and middle node.
-        numbers: node numbers in the file, shape (n,), for messages.
-
-    Raises:
-        InputError: a boundary edge is no edge of an element.
+    The node `numbers` of the file, (n,), are for messages.
     """
     edges = {(frozenset(row[[i, j]].tolist()), int(row[k])) for triangles in layers.values() for row in triangles
              for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5))}
@@ -146,16 +138,7 @@ def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray)
 
 
 def _checked_numbering(numbering: str, lines: _Lines | None = None) -> str:
-    """Return the name of the order of the six nodes of an element, checked.
-
-    Args:
-        numbering: "corners" (the three corners, then the middles of the edges) or "around" (corner, middle, corner, ...
-            along the boundary of the element).
-        lines: lines of the file that is read, for messages; None when a file is written.
-
-    Raises:
-        InputError: the numbering is unknown.
-    """
+    """Return the checked order of the six nodes, "corners" first or "around"; otherwise an InputError."""
     if numbering not in _NUMBERINGS:
         message = f"numbering = {numbering!r}: must be one of {', '.join(map(repr, _NUMBERINGS))}"
         raise lines.error(message) if lines else InputError(f"mesh.write: {message}")
@@ -163,16 +146,7 @@ def _checked_numbering(numbering: str, lines: _Lines | None = None) -> str:
 
 
 def _new_name(lines: _Lines, words: Sequence[str], taken: Any) -> str:
-    """Return the name of a layer or boundary from the first line of its block, such as "boundary 10 bottom".
-
-    Args:
-        lines: lines of the file, for messages.
-        words: words of this line; the name begins with the third.
-        taken: names of the earlier layers or boundaries.
-
-    Raises:
-        InputError: an earlier layer or boundary has this name.
-    """
+    """Return the new name of a layer or boundary from its line of words; InputError if it is taken."""
     name = " ".join(words[2:])
     if name in taken:
         raise lines.error(f"a second block {words[0]!r} is called {name!r}")
@@ -206,15 +180,8 @@ class _Lines(Iterator):
     def block(self, count: str, kinds: tuple, what: str, nodes: dict | None = None, all_nodes: bool = False) -> list:
         """Return the next `count` lines of numbers as lists, with node numbers converted to indices.
 
-        Args:
-            count: the number of lines, as text.
-            kinds: function of a word that returns its number, for each column.
-            what: contents of a line, for messages.
-            nodes: {node number: index} for all columns but the first; None for no conversion.
-            all_nodes: True if the first column is a node number, too.
-
-        Raises:
-            InputError: a line is missing or has another form, or a node is unknown.
+        `kinds` convert the words of each column; `nodes` is {number: index} for all columns but the first, or
+        `all_nodes`. Another form or an unknown node is an InputError.
         """
         if not (count.isascii() and count.isdigit() and len(count) <= 15) or int(count) < 1:
             raise self.error(f"the count {count!r} must be a whole number of at least 1")

@@ -45,13 +45,7 @@ class Place(NamedTuple):
 
 
 def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
-    """Return the place of a point with the nearest boundary, for error messages; collective.
-
-    Args:
-        mesh: the mesh.
-        point: reference coordinates, shape (2,), in three dimensions (3,), length, equal on all ranks.
-        layer: name of the layer that contains the point, "" if unknown.
-    """
+    """Return the place of a point, (2,) or (3,), length, with the nearest boundary, for messages; collective."""
     best, size = ("", np.inf), 0.0
     for name in mesh.boundaries:
         nodes = mesh.nodes_of(name)
@@ -69,11 +63,7 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
 
     It is 1 for an equilateral triangle, 0 for a flat one, and negative for a clockwise one.
 
-    Args:
-        corners: corners of the triangles, shape (n, 3, 2), in three dimensions (n, 3, 3), length.
-
-    Returns:
-        Shape quality of each triangle, shape (n,); positive in three dimensions.
+    Corners have shape (n, 3, 2), in three dimensions (n, 3, 3), length, where q is positive; the result has shape (n,).
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     if corners.shape[2] == 3:
@@ -86,9 +76,6 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
 
 class Triangles:
     """Sizes of the m triangles of a mesh, gathered from all ranks; collective.
-
-    Args:
-        mesh: the mesh.
 
     Attributes:
         corners: corners (R, Z), in three dimensions (x, y, z), shape (m, 3, 2 or 3), length.

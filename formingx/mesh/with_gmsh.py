@@ -16,11 +16,7 @@ _LIBRARIES = "libglu1-mesa, libgl1, libgomp1, libxcursor1, libxft2 and libxinera
 
 
 def imported() -> Any:
-    """Return the module gmsh.
-
-    Raises:
-        InputError: it is not there, or a library of the system is missing.
-    """
+    """Return the module gmsh; InputError without it or a library of the system."""
     try:
         import gmsh
     except (ImportError, OSError) as error:
@@ -32,15 +28,7 @@ def imported() -> Any:
 
 @contextmanager
 def model(name: str, options: Mapping[str, float] | None = None) -> Iterator[Any]:
-    """Provide gmsh with a new model within a block; afterwards the script's model and options are restored.
-
-    Args:
-        name: name of the model.
-        options: {name: value} of gmsh options.
-
-    Yields:
-        The module gmsh.
-    """
+    """Provide gmsh with a new model and options in a block; the script's ones are then restored."""
     gmsh = imported()
     own_session = not gmsh.isInitialized()
     if own_session:
