@@ -12,12 +12,7 @@ from ..physics.supports import Constrained
 def check(scene: Any) -> None:
     """Check that the boundary of each item exists and has an area, and that a load knows its layers.
 
-    Args:
-        scene: the `Scene`.
-
-    Raises:
-        InputError: a boundary does not exist or is empty, a load or a contact acts on the axis, a load has a density
-            for a layer that does not exist, or two hinges support the same boundary.
+    An InputError also reports a load or contact on the axis, and two hinges on one boundary.
     """
     mesh, hinged = scene.mesh, set()
     size = mesh.comm.allreduce(np.abs(mesh.domain.geometry.x).max(initial=0.0), MPI.MAX)

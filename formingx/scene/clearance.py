@@ -12,22 +12,10 @@ from .scene import Scene
 
 
 def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
-    """Check that the tools do not overlap in the stages of a process, and that none passes a constrained boundary.
+    """Check that tools do not overlap in the stages of a process, and that none passes a constrained boundary.
 
-    The travel of a tool may be unknown before the run, as in a stage that ends at a pole height. The tool is then not
-    checked in this stage and the following ones.
-
-    Args:
-        scene: the `Scene`.
-        plans: the stages, each with the numbers of the items that move or are inactive in it
-            (`formingx.solve.stage.Plan`).
-        travels: travels of the tools at the beginning, {number in `Scene.items`: length}; None: all are 0.
-
-    Returns:
-        The plans of the stages at whose beginning a travel is unknown. They must be checked when the run reaches them.
-
-    Raises:
-        InputError: two tools overlap, or a constrained boundary would lie inside a tool.
+    Travels are {number in `Scene.items`: length}, None: all 0. Stages from which on a travel is unknown are returned,
+    to be checked when the run reaches them. A violation is an InputError.
     """
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
@@ -48,15 +36,7 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
 
 
 def check_target(scene: Scene, target: Any) -> None:
-    """Check that the tool that `trace` drives does not overlap another tool on its way to a target.
-
-    Args:
-        scene: the `Scene`.
-        target: the target, with `name` and `value`; only a travel is checked.
-
-    Raises:
-        InputError: two tools overlap.
-    """
+    """Raise an InputError if the tool that `trace` drives overlaps another one on its way to a target travel."""
     if target.name != "travel" or not isinstance(scene.driven, Contact):
         return
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
@@ -67,18 +47,7 @@ def check_target(scene: Scene, target: Any) -> None:
 
 def _check_motion(scene: Scene, label: str, tools: dict[int, Contact], outlines: dict[int, Any],
                   travels: tuple[dict[int, float], dict[int, float]]) -> None:
-    """Check that tools do not overlap at some positions of a motion.
-
-    Args:
-        scene: the `Scene`.
-        label: stage or target, for the message.
-        tools: the tools, {number in `Scene.items`: contact}.
-        outlines: their outlines, {number: result of `_outline`}.
-        travels: travels of the tools, {number: length}, at the start and at the end.
-
-    Raises:
-        InputError: two tools overlap.
-    """
+    """Raise an InputError, with the label of stage or target, if tools overlap in a motion between travels."""
     start, end = travels
     for part in np.linspace(0, 1, PIECE_POINTS) if end != start else [1.0]:
         current = {i: start[i] + part * (end[i] - start[i]) for i in start}
@@ -86,14 +55,9 @@ def _check_motion(scene: Scene, label: str, tools: dict[int, Contact], outlines:
 
 
 def _break_points(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, float]]:
-    """Yield the travels of all tools, {number in `Scene.items`: length}, at the break points of a stage.
+    """Yield the travels {number in `Scene.items`: length} at the break points of a stage, or at its end.
 
-    These are the points of its tables over time, between which travels are linear, or else the end of the stage. A
-    travel that is known only in the run is nan.
-
-    Args:
-        plan: the stage with the numbers of its items (`formingx.solve.stage.Plan`).
-        travels: travels at the beginning of the stage, {number in `Scene.items`: length}.
+    Between points of its tables they are linear. A travel that is known only in the run is nan.
     """
     if plan.tables:
         for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):

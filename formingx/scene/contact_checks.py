@@ -18,15 +18,8 @@ OTHER_UNIT = 4.0
 def check_start(scene: Any, contact: Contact) -> None:
     """Check that the body starts outside a tool, and that the contact face is its boundary nearest to the tool.
 
-    The coefficient of friction must have a value at the temperatures of the face. No controlled pressure may act on the
-    face. The contact points must be dense enough to detect the tool (`tool_width.check`).
-
-    Args:
-        scene: the `Scene`.
-        contact: the `Contact` of the face with the tool.
-
-    Raises:
-        InputError: one of these conditions is violated, or the tool does not fit the kinematics.
+    Friction must be known at the temperatures of the face, no controlled pressure may act there, and the points must be
+    dense (`tool_width.check`). A violation is an InputError.
     """
     contact.friction_at(None if scene.temperature is None else scene.temperature.at_boundary(contact.on))
     mesh, near = scene.mesh, 1e-6 * max(scene.extent)
@@ -67,13 +60,9 @@ def check_start(scene: Any, contact: Contact) -> None:
 
 
 def _fits_upside_down(contact: Contact, face: np.ndarray, points: np.ndarray, near: float) -> bool:
-    """Return True if the tool, mirrored and moved along Z to where it touches a face, is free of the body.
+    """Return True if the tool, mirrored and moved along Z to touch a face (m, 2), is free of the body (n, 2).
 
-    Args:
-        contact: the `Contact`.
-        face: positions of the nodes of the face, shape (m, 2), length.
-        points: positions of all nodes of the body, shape (n, 2), length.
-        near: round-off of a length.
+    `near` is the round-off of a length.
     """
     tool = contact.tool.mirrored()
     low, high = tool.bounds[:, 1]
@@ -83,16 +72,7 @@ def _fits_upside_down(contact: Contact, face: np.ndarray, points: np.ndarray, ne
 
 
 def check_travel(scene: Any, contact: Contact, travel: float) -> None:
-    """Check that a tool does not pass through a constrained boundary.
-
-    Args:
-        scene: the `Scene`.
-        contact: the `Contact` of the tool.
-        travel: travel of the tool, length.
-
-    Raises:
-        InputError: all nodes of a constrained boundary would lie inside the tool.
-    """
+    """Raise an InputError if all nodes of a constrained boundary lie inside a tool after a travel, length."""
     moves = contact.travel_vector
     for support in scene.supports:
         for constraint in scene.kinematics.in_axes(support, support.constraints()):

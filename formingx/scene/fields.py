@@ -21,28 +21,7 @@ _WHAT = ("a number, a table({{{0}: value}}), a function of ({0}, {1}), a CSV fil
 
 
 def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperature") -> np.ndarray:
-    """Evaluate a given temperature at points of a mesh; collective. Each rank may give other points.
-
-    Args:
-        field: the temperature, in one of the following forms. For a sheet in three dimensions x and y replace R and Z.
-
-            - A number.
-            - A `Table` over R.
-            - A function of arrays (R, Z), shape (n,) each; in three dimensions (x, y) or (x, y, z).
-            - The name of a CSV file with columns R, Z, T (points all around the body), or R, T, or Z, T (constant along
-              the other coordinate).
-            - The result of `fx.heat`, of which the last state counts.
-            - A scalar DOLFINx `Function` on a mesh of the body.
-        points: reference positions, shape (n, 2 or 3), length.
-        mesh: the `Mesh`.
-        name: name of the argument, for messages.
-
-    Returns:
-        Temperatures at the points, shape (n,).
-
-    Raises:
-        InputError: `field` has another form, a value is not finite, or a point lies outside a table or a file.
-    """
+    """Return the given temperature at reference points (n, 2 or 3), shape (n,); collective."""
     comm: Any = mesh.comm
     first = comm.scan(len(points)) - len(points)
     # all ranks look at all points, so that they raise the same errors
@@ -52,12 +31,7 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
     """Return the values of a temperature at n points, shape (n,), equal on all ranks; collective.
 
-    Args:
-        field: the temperature. It is a number, a `Table` over the first coordinate, a function of both coordinates, the
-            name of a CSV file, the result of `fx.heat`, or a DOLFINx `Function`.
-        points: reference positions, the same on all ranks, shape (n, 2), length.
-        name: name of the argument, for messages.
-        axes: names of the coordinates, "RZ" or "xyz".
+    `field` is as in `Scene`; the points are the same on all ranks, shape (n, 2), length; axes are "RZ" or "xyz".
     """
     if isinstance(field, type | Mapping | Sequence) and not isinstance(field, str):
         raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}")
@@ -83,12 +57,7 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
 class PointReader:
     """Evaluation of scalar finite element functions at fixed points of a mesh.
 
-    Args:
-        space: DOLFINx function space of the functions.
-        points: reference positions, shape (n, 2), length, equal on all ranks.
-
-    Raises:
-        InputError: a point lies outside the mesh.
+    The reference points have shape (n, 2), length, equal on all ranks. A point outside the mesh is an InputError.
     """
 
     def __init__(self, space: Any, points: np.ndarray):
@@ -102,14 +71,7 @@ class PointReader:
                          else np.zeros((0, element.dim)))
 
     def read(self, array: np.ndarray) -> np.ndarray:
-        """Return the values of a scalar finite element function at the n points, on all ranks; collective.
-
-        Args:
-            array: coefficients of the function on this rank, with ghosts.
-
-        Returns:
-            Values, shape (n,).
-        """
+        """Return a function with coefficients of this rank, ghosts included, at n points, (n,); collective."""
         values = np.zeros(self._n)
         values[self._mine] = (self._weights * array[self._dofs]).sum(1)
         return self._comm.allreduce(values)
@@ -168,11 +130,5 @@ def _check_inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) 
 
 
 def _first_false(points: np.ndarray, mask: np.ndarray, axes: str) -> str:
-    """Return the coordinates of the first point with False in the mask, as text.
-
-    Args:
-        points: points, shape (n, 2), length.
-        mask: mask of the points, shape (n,).
-        axes: names of the coordinates, "RZ" or "xyz".
-    """
+    """Return the coordinates of the first of points (n, 2) with False in the mask (n,), as text."""
     return f"({', '.join(axes)}) = ({', '.join(f'{v:.6g}' for v in points[np.argmin(mask)])})"

@@ -14,17 +14,10 @@ from .temperature import GivenTemperature
 
 
 def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | None = None) -> Sample:
-    """Return the quadrature points in the locally owned cells of a layer, cell by cell.
+    """Return the quadrature points of a degree in the owned cells of a layer, cell by cell.
 
-    Args:
-        mesh: the `Mesh`.
-        layer: name of the layer.
-        degree: degree of the quadrature rule.
-        temperature: temperature of the scene, or None.
-
-    Returns:
-        Reference positions of q points in each of m cells, shape (m q, 2 or 3), length. Local numbers of the cells,
-        shape (m,), positions in the reference cell, shape (q, 2), and temperatures, shape (m q,) or None.
+    In m cells with q points each: positions (m q, 2 or 3), length, cells (m,), places in the reference cell (q, 2),
+    temperatures (m q,) or None.
     """
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])

@@ -12,14 +12,7 @@ from ..values.temperature import FunctionOfTemperature
 
 
 def summary(scene: Any) -> dict[str, str]:
-    """Describe mesh, materials, items, model and temperature of a scene in a line each; not collective.
-
-    Args:
-        scene: the `Scene`.
-
-    Returns:
-        {name of the part, such as "load 1": its description}.
-    """
+    """Return {part of a scene, such as "load 1": its description in a line}; not collective."""
     mesh, extent = scene.mesh, scene.extent
     kind, axes = ("six-node ", "(R, Z)") if scene.kinematics.components == 2 else ("", "(x, y, z)")
     if len(extent) == 3 and extent[2] <= 1e-9 * max(extent):
@@ -65,14 +58,7 @@ def _material(item: Any, temperatures: list[float]) -> str:
 
 
 def text(item: Any) -> str:
-    """Describe an object without memory addresses.
-
-    Args:
-        item: the object.
-
-    Returns:
-        The repr of the object or, if its class defines none, the name of the class and the public attributes.
-    """
+    """Return the repr of an object without addresses, or its class and public attributes."""
     if type(item).__repr__ is object.__repr__:
         inside = ", ".join(f"{k}={v!r}" for k, v in vars(item).items() if not k.startswith("_"))
         return f"{type(item).__name__}({inside})"

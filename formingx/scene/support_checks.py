@@ -15,14 +15,7 @@ _PRESSED = ("; tools hold only what touches them: of a body between two plates m
 
 
 def check_driven(supports: Sequence[Any]) -> None:
-    """Check that no support drives a displacement component that another support constrains or drives.
-
-    Args:
-        supports: the active supports.
-
-    Raises:
-        InputError: two supports act on the same component of the same boundary.
-    """
+    """Raise an InputError if a support drives a displacement component that another acts on."""
     pairs = [(support, constraint) for support in supports for constraint in support.constraints()]
     for mine, driven in pairs:
         for other, constraint in pairs if driven.driven else ():
@@ -33,12 +26,7 @@ def check_driven(supports: Sequence[Any]) -> None:
 def check_axis(scene: Any, supports: Sequence[Any]) -> None:
     """Check that an axisymmetric mesh does not cross the axis R = 0, and that a support constrains u_r on it.
 
-    Args:
-        scene: the `Scene`.
-        supports: the active supports.
-
-    Raises:
-        InputError: the mesh crosses the axis, or it touches the axis and no support constrains u_r there.
+    A violation is an InputError.
     """
     if not scene.kinematics.axisymmetric:
         return
@@ -69,12 +57,7 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
 
     is singular.
 
-    Args:
-        scene: the `Scene`.
-        supports: the active supports.
-
-    Raises:
-        InputError: the body can move as a rigid body.
+    A body that can move is an InputError.
     """
     names, modes = zip(*scene.kinematics.rigid_motions().items())
     gram = np.zeros((len(modes), len(modes)))
@@ -99,17 +82,10 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
 
 
 def check_hinges(scene: Any) -> None:
-    """Check that no layer at a hinge is much softer than another layer at the same rim.
+    """Raise an InputError if a layer at a hinge is much softer than another layer at the same rim.
 
-    A hinge (`SimplySupported`) with weight="area" pulls all layers with one traction, so their shear moduli may differ
-    at most by a factor of 100. The rim face of a hinge can bulge, so a pressure would squeeze out a loaded layer that
-    is 50 times softer than another one.
-
-    Args:
-        scene: the `Scene`.
-
-    Raises:
-        InputError: a layer at a hinge is too soft.
+    A hinge with weight="area" pulls all layers with one traction, so moduli may differ by a factor of 100; a loaded
+    layer 50 times softer would be squeezed out.
     """
     moduli = {name: scene.shear_modulus(name) for name in scene.materials}
     for constraint in (constraint for support in scene.supports for constraint in support.constraints()):

@@ -29,16 +29,12 @@ class MirrorPlane(NamedTuple):
 
 
 class MirrorPlanes:
-    r"""Mirror planes of a scene: the modelled body is a half, a quarter or an eighth of the whole part.
+    """Mirror planes of a scene: the modelled body is a half, a quarter or an eighth of the whole part.
 
     With m planes the whole part consists of :math:`2^m` images of the body. A `Symmetry` is a mirror plane if its
     boundary is flat and lies at an end of the body, unless it has `guide=True`. The axis of an axisymmetric body does
     not count: results belong to the whole ring. Two parallel planes do not count: the body is one period of an endless
     body, and results belong to this period.
-
-    Args:
-        planes: mirror planes with different normals.
-        near: tolerance of positions, length.
 
     Attributes:
         planes: mirror planes with different normals.
@@ -50,14 +46,7 @@ class MirrorPlanes:
 
     @classmethod
     def of_description(cls, scene: dict[str, Any]) -> MirrorPlanes:
-        """Return the mirror planes of a scene that is given as plain data, as in a checkpoint.
-
-        Args:
-            scene: the data, as `formingx.results.files.description.describe` returns them.
-
-        Returns:
-            The mirror planes.
-        """
+        """Return the mirror planes of a scene from the data of `formingx.results.files.description.describe`."""
         found = scene.get("symmetry")
         return cls(tuple(MirrorPlane(*plane) for plane in found["planes"]), found["near"]) if found else cls()
 
@@ -72,32 +61,15 @@ class MirrorPlanes:
         return _PARTS.get(len(self.planes), "")
 
     def basis(self, depth: str | None) -> str:
-        """Return the body to which the results belong as text, such as "the whole part (a half was modelled)".
-
-        Args:
-            depth: unit of depth in plane strain, such as "mm", or "unit"; None for other kinematics.
-
-        Returns:
-            The text; "" if the whole part is modelled and `depth` is None.
-        """
+        """Return what results belong to, such as "the whole part (a half was modelled)", or ""; `depth` is a unit."""
         part = f"the whole part (a {self.part_name} was modelled)" if self.planes else "the part"
         return f"{part}, per {depth} of depth" if depth else part * bool(self.planes)
 
     def factor_of(self, extent: np.ndarray, direction: np.ndarray) -> int:
-        r"""Return the ratio of the force on a whole tool or support to the force on its part in the model.
+        """Return the ratio, a power of 2, of the force on a whole tool or support to that on its part in the model.
 
-        The ratio is :math:`2^m` with the number m of planes that count. A plane counts if the tool or the boundary of
-        the support reaches it, because it then continues on the other side. It does not count if the direction
-        has a component normal to the plane. The forces on both sides are then opposite and would cancel, so the force
-        on one side is returned.
-
-        Args:
-            extent: lowest and highest coordinates of the tool or of the support's boundary, shape (2, components),
-                length.
-            direction: direction of the force, shape (components,).
-
-        Returns:
-            The ratio, a power of 2.
+        A plane counts if `extent`, (2, components), reaches it and the direction (components,) has no component normal
+        to it.
         """
         low, high = extent
         cut = [plane for plane in self.planes if abs(direction[plane.axis]) < 1e-9 and (
@@ -110,13 +82,8 @@ class MirrorPlanes:
 
         .. math:: x_i \to a_i x_i + b_i
 
-        Args:
-            components: number of components of x.
-            extent: lowest and highest coordinates of a tool, shape (2, components), length; planes that the tool
-                crosses are left out. None for the body.
-
-        Returns:
-            List of (a, b), shape (components,) each; the first is the identity.
+        `extent`, shape (2, components), length, of a tool leaves out planes that it crosses. The first map (a, b),
+        shape (components,) each, is the identity.
         """
         found = [(np.ones(components), np.zeros(components))]
         for plane in self.planes:
@@ -134,14 +101,7 @@ NO_PLANES = MirrorPlanes()
 
 
 def mirror_planes(scene: Any) -> MirrorPlanes:
-    """Return the mirror planes of a scene, found from its `Symmetry` supports; collective.
-
-    Args:
-        scene: the `Scene`.
-
-    Returns:
-        The mirror planes.
-    """
+    """Return the mirror planes of a scene, found from its `Symmetry` supports; collective."""
     if scene.state_transfer is not None:
         return scene.first.symmetry
     mesh, kinematics, found = scene.mesh, scene.kinematics, []

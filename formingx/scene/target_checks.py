@@ -17,18 +17,7 @@ _GRID_SQUARES = 200         # number of squares along a mould's larger side
 
 def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None = None,
           continues: bool = False) -> None:
-    """Check that no target of a run contradicts the scene, before anything is solved (`unreachable`).
-
-    Args:
-        scene: the `Scene`.
-        targets: the targets, with `name` and `value`, see `formingx.measures.targets`.
-        inactive: numbers in `Scene.items` of the items that a stage leaves out. None: the target is for a run from the
-            unloaded state with one control (`trace`).
-        continues: True if the run continues another one, and may withdraw a tool.
-
-    Raises:
-        InputError: a target cannot be reached.
-    """
+    """Raise an InputError if a target of a run contradicts the scene (`unreachable`), before anything is solved."""
     for target in targets:
         why = unreachable(scene, target, inactive, continues)
         if why is not None:
@@ -37,19 +26,10 @@ def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None
 
 def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = None,
                 continues: bool = False) -> str | None:
-    """Return the reason why no run of a scene can reach a target.
+    """Return the reason why no run of a scene can reach a target, or None.
 
-    For example a pole stretch may exceed the limit of the material, or a pole may lie inside a mould.
-
-    Args:
-        scene: the `Scene`.
-        target: the target, with `name` and `value`.
-        inactive: numbers in `Scene.items` of the items that a stage leaves out. None: the target is for a run from the
-            unloaded state with one control (`trace`).
-        continues: True if the run continues another one, and may withdraw a tool.
-
-    Returns:
-        The reason as text; None if no reason is known.
+    A stage leaves out `inactive` items (numbers in `Scene.items`), None for a run of `trace`; a run that `continues`
+    may withdraw a tool.
     """
     name, value, driven = target.name, target.value, scene.driven
     active = [item for i, item in enumerate(scene.items) if i not in (inactive or ())]
@@ -92,17 +72,9 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
 
 
 def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
-    """Return the reason why a pressure or a travel is implausibly large for a scene.
+    """Return the reason why a "pressure" or "travel" is implausibly large for a scene, or None.
 
-    The largest plausible absolute value is 1e9 times the shear modulus, or 1e9 times the extent of the body.
-
-    Args:
-        scene: the `Scene`.
-        quantity: "pressure" or "travel"; another quantity is not checked.
-        value: pressure, stress, or travel, length.
-
-    Returns:
-        The reason as text; None if the value is plausible.
+    It is above 1e9 times the shear modulus, or the extent of the body.
     """
     units = {"pressure": ("the shear modulus", max(scene.shear_modulus(name) for name in scene.mesh.layers)),
              "travel": ("the length of the body", float(max(scene.extent)))}
@@ -169,13 +141,10 @@ def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
 
 
 def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
-    """Return the volume between a body and its mould, by counting the squares of a grid over the section.
+    """Return the volume between a body and its mould by squares of a grid, and an upper bound over it.
 
-    For a flat body a square counts if its centre is outside the tool and in the cavity next to the body.
-
-    Returns:
-        The counted volume, length^3, or length^2 in plane strain; infinite if the mould is open. Then an upper bound of
-        the true volume, divided by the counted volume.
+    The volume, length^3 or length^2, is infinite in an open mould. For a flat body, squares next to the body and
+    outside the tool count.
     """
     from scipy.ndimage import binary_dilation, label
     face = scene.mesh.nodes_of(contact.on)
@@ -205,13 +174,7 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
 def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
     """Return the volume between a tube, closed below, and its mould, up to the upper end of the tube, length^3.
 
-    It is infinite if the mould is open.
-
-    Args:
-        scene: the `Scene`.
-        contact: contact with the mould.
-        line: outer face in the reference configuration, from one end to the other, shape (n, 2), length. The volume
-            that it encloses does not count.
+    It is infinite if the mould is open. The volume that the outer face `line`, (n, 2), length, encloses does not count.
     """
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]

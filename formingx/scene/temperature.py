@@ -33,19 +33,13 @@ class Expansion(Protocol):
 class GivenTemperature:
     """Temperature of the body that a scene gives, interpolated to quadratic elements on the mesh.
 
-    Args:
-        given: the temperature. It is a number, a `Table` over R, a function of arrays (R, Z), the name of a CSV file,
-            the result of `fx.heat`, or a DOLFINx `Function`.
-        mesh: mesh of the scene.
+    A temperature that is not defined all over the body is an InputError.
 
     Attributes:
         given: the argument `given`.
         mesh: the argument `mesh`.
         T: DOLFINx `Function` (P2) with the given temperature; the changing temperature of a run is a
             `formingx.forms.temperature.Temperature`.
-
-    Raises:
-        InputError: the temperature is not defined all over the body.
     """
 
     def __init__(self, given: Any, mesh: Mesh):
@@ -56,30 +50,13 @@ class GivenTemperature:
         self.T.x.array[:] = fields.values_at(given, points, mesh, "Scene: temperature")
 
     def in_cells(self, cells: np.ndarray, places: np.ndarray, values: np.ndarray | None = None) -> np.ndarray:
-        """Return the temperatures at the same q points of each of m cells.
-
-        Args:
-            cells: local numbers of the cells, shape (m,).
-            places: positions of the points in the reference cell, shape (q, 2).
-            values: coefficients of one or more functions in the space of `T`, with ghosts, shape (..., n); None: the
-                coefficients of `T`.
-
-        Returns:
-            Temperatures, shape (..., m, q).
-        """
+        """Return temperatures (..., m, q) at q places (q, 2) of m cells, of `values` (..., n) or of `T`."""
         space = self.T.function_space
         basis = space.element.basix_element.tabulate(0, places)[0, :, :, 0]
         return (self.T.x.array if values is None else values)[..., space.dofmap.list[cells]] @ basis.T
 
     def at_boundary(self, boundary: str) -> np.ndarray:
-        """Return the temperatures at the nodes of a boundary, of all ranks one after the other; collective.
-
-        Args:
-            boundary: name of the boundary.
-
-        Returns:
-            Temperatures, shape (n,), equal on all ranks. A node that ranks share occurs more than once.
-        """
+        """Return the temperatures at the nodes of a boundary of all ranks, shared ones repeated, (n,); collective."""
         nodes = fem.locate_dofs_topological(self.T.function_space, 1, self.mesh.facets_of(boundary))
         return gathered(self.mesh.comm, self.T.x.array[nodes])
 

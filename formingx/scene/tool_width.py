@@ -19,16 +19,9 @@ _MAX_MOVES = 200
 
 
 def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
-    """Check that the contact points of a face are dense enough to detect a tool.
+    """Raise an InputError if the contact points of a face are too sparse to detect a tool.
 
-    Args:
-        mesh: the `Mesh` of the body.
-        contact: the `Contact` of the face with the tool.
-        axisymmetric: True for an axisymmetric body, False in plane strain.
-
-    Raises:
-        InputError: the tool could pass between two contact points, or penetrate the face by more than 10 % (`CUT`) of
-            the thickness before it meets a contact point.
+    It could pass between two, or cut more than 10 % (`CUT`) of the thickness before it meets one.
     """
     ends = gathered(mesh.comm, facet_node_positions(mesh.domain, mesh.facets_of(contact.on))[:, :2])
     if contact.tool.closed:
@@ -57,16 +50,10 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 
 
 def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
-    """Raise an InputError if a tool would cut deeply into the undeformed face before it meets a contact point.
+    """Raise an InputError if a tool would cut more than `CUT` of the thickness before it meets a contact point.
 
-    Deeply means more than a tenth (`CUT`) of the thickness. The tool moves repeatedly by its distance from the nearest
-    contact point (sphere tracing), so it passes no point. The path of a tool without a direction is not known. It is
-    assumed to be straight, along the normal of the tool at the nearest edge of the face.
-
-    Args:
-        contact: the contact of the face with the tool.
-        ends: end points of the n element edges of the face, shape (n, 2, 2), length.
-        thickness: thickness of the body, length.
+    It moves by its distance from the nearest point (sphere tracing), so it passes none; without a direction it moves
+    along its normal. Edges of the face have ends (n, 2, 2), length.
     """
     tool = contact.tool
     near = tool.nearest(ends.mean(1))
