@@ -16,13 +16,8 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
                name: str) -> list[Line | Arc]:
     """Return successive arcs and lines that approximate a curve, with equal tangents at their joints.
 
-    Args:
-        curve: function of parameters from 0 to 1, shape (n,), that returns points and derivatives, shape (n, 2) each.
-        tolerance: largest distance from the curve, length.
-        name: beginning of the error message.
-
-    Raises:
-        InputError: the curve is not smooth enough, or the tolerance is too small.
+    The curve maps parameters from 0 to 1, (n,), to points and derivatives, (n, 2) each; `tolerance` is the largest
+    distance, length. A kink or a small tolerance is an InputError.
     """
     size = float(np.ptp(curve(np.linspace(0, 1, 17))[0], axis=0).max())
     if tolerance < _MIN_TOLERANCE * size:
@@ -50,14 +45,9 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
 
 
 def in_plane(points: np.ndarray, name: str) -> np.ndarray:
-    """Return the coordinates (x, y) of points in the plane z = 0, shape (n, 2).
+    """Return the coordinates (x, y), shape (n, 2), of points (n, 3) in the plane z = 0, length.
 
-    Args:
-        points: points (x, y, z), shape (n, 3), length.
-        name: beginning of the error message.
-
-    Raises:
-        InputError: a point lies outside the plane.
+    A point outside the plane is an InputError, which begins with `name`.
     """
     points = np.asarray(points, dtype=float).reshape(-1, 3)
     outside = ~(np.abs(points[:, 2]) <= 1e-9 * max(np.abs(points[:, :2]).max(initial=0.0), 1e-300))
@@ -69,15 +59,9 @@ def in_plane(points: np.ndarray, name: str) -> np.ndarray:
 
 
 def piece_through(points: np.ndarray, name: str) -> Line | Arc:
-    """Return the line or the circular arc through given points.
+    """Return the line or the circular arc through points (R, Z) in their order, shape (n, 2), length.
 
-    Args:
-        points: points (R, Z) in their order along the line or arc, shape (n, 2), length.
-        name: beginning of the error message.
-
-    Raises:
-        InputError: the points lie on no line or circle, or not in this order. Fewer than four points do not define an
-            arc.
+    Points on neither, in another order, or fewer than four of an arc, are an InputError.
     """
     if not np.all(np.isfinite(points)):
         raise InputError(f"{name}: its coordinates are not all finite numbers")

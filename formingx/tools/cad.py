@@ -25,20 +25,10 @@ _BYTES_PER_SECOND = 50_000  # size of a file that adds one second, bytes
 
 
 def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
-    """Return the curves of a STEP or BREP file.
+    """Return {number of a curve: function that returns its lines and arcs} of a "step" or "brep" file.
 
-    Args:
-        file: name of the file.
-        kind: "step" or "brep".
-        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, in the unit of the
-            file; None if arcs may not replace them.
-
-    Returns:
-        {number of a curve: function without arguments that returns its lines and arcs}. The function raises an
-        InputError if the curve is outside the plane, or needs a tolerance.
-
-    Raises:
-        InputError: the file cannot be read.
+    `tolerance` is the distance of arcs that replace a spline or an ellipse; None forbids it. The function raises an
+    InputError outside the plane or without a tolerance.
     """
     if kind == "step":
         _check_references(file)
@@ -50,9 +40,7 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
 class _Reader:
     """Reader of one STEP or BREP file in a separate process, which ends with the `with` block.
 
-    Args:
-        file: name of the file.
-        kind: "step" or "brep".
+    The kind is "step" or "brep".
 
     Attributes:
         bounds: {number of a curve: [lowest, highest value of its curve parameter]}.
@@ -81,18 +69,14 @@ class _Reader:
         self._process.communicate()
 
     def evaluate(self, tag: int, parameters: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return n points of curve number `tag`, and their derivatives by its parameter, shape (n, 3) each.
-
-        parameters: values of the curve parameter, shape (n,).
-        """
+        """Return points and derivatives, (n, 3) each, of curve `tag` at parameters of shape (n,)."""
         points, derivatives = self._answer([tag, parameters.tolist()])
         return np.array(points).reshape(-1, 3), np.array(derivatives).reshape(-1, 3)
 
     def _answer(self, question: Any = None) -> Any:
         """Send a question to the separate process, if it is not None, and return its next line of output, as JSON data.
 
-        Raises:
-            InputError: the process reports an error, crashes, or takes too long.
+        An error, a crash or a timeout of the process is an InputError.
         """
         process, line = self._process, ""
         assert process.stdin is not None and process.stdout is not None
@@ -118,12 +102,8 @@ def _of_curve(evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], b
               tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
     """Return a function that returns the lines and arcs of a curve, or raises the error of their computation.
 
-    Args:
-        evaluate: function of parameters, shape (n,), that returns points and derivatives, shape (n, 3) each.
-        bounds: lowest and highest parameter.
-        tolerance: largest distance between the curve and the arcs that replace it, length; None for a curve that must
-            be a line or an arc.
-        name: beginning of the error message.
+    `evaluate` maps parameters (n,) within `bounds` to points and derivatives, (n, 3) each. Without a tolerance the
+    curve must be a line or an arc.
     """
     low, high = bounds
 
@@ -148,12 +128,9 @@ def _raise(error: InputError) -> list[Line | Arc]:
 
 
 def _check_references(file: str) -> None:
-    """Check that a STEP file is complete: it has its end, and defines every referenced item once.
+    """Raise an InputError unless a STEP file has its end, and defines every referenced item once.
 
     The reader would leave out such parts without an error.
-
-    Raises:
-        InputError: the file is incomplete.
     """
     text = re.sub(r"'[^']*'|/\*.*?\*/", "", Path(file).read_bytes().decode("latin-1"), flags=re.DOTALL)
     if "END-ISO-10303-21" not in text:

@@ -15,13 +15,8 @@ import sys
 def main(file: str, kind: str, seconds: int) -> None:
     """Read the file, print its curves, then answer requests for points of the curves, until standard input ends.
 
-    A request is a line of JSON, [number of a curve, [parameters]]. Its answer is the line [coordinates of the points,
-    coordinates of their derivatives by the parameter].
-
-    Args:
-        file: name of the file.
-        kind: "step" or "brep".
-        seconds: processor time after which the system ends the process, s.
+    A request is a JSON line [curve, [parameters]], its answer [coordinates, derivatives]. The system ends the process
+    after `seconds` of processor time.
     """
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))

@@ -16,21 +16,10 @@ from .pieces import TURN, Arc, Line
 
 
 def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
-    """Return the curves in the model space of a drawing, numbered from 1.
+    """Return {number from 1: function that returns its lines and arcs} of the curves in the model space of a drawing.
 
-    Texts, dimensions, hatches, points and invisible entities are skipped.
-
-    Args:
-        file: name of the file.
-        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, in the unit of the
-            file; None if arcs may not replace them.
-
-    Returns:
-        {number of a curve: function without arguments that returns its lines and arcs}. The function raises an
-        InputError if the curve is outside the plane, or a spline or an ellipse without a tolerance.
-
-    Raises:
-        InputError: ezdxf is not installed, or the file cannot be read.
+    Texts, dimensions, hatches, points and invisible entities are skipped. The function raises an InputError outside the
+    plane or, for splines and ellipses, without a tolerance; so does a missing ezdxf or unreadable file.
     """
     try:
         import ezdxf
@@ -52,31 +41,17 @@ def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callab
 
 
 def _check_counts(expected: Counter, found: Counter) -> None:
-    """Check that ezdxf found all curves of a drawing.
-
-    Args:
-        expected: {kind: number of its curves in the file}.
-        found: {kind: number of its curves that ezdxf found}.
-
-    Raises:
-        ValueError: a curve is missing.
-    """
+    """Raise a ValueError if ezdxf found fewer curves of a kind than the file has."""
     for kind in _READERS:
         if found[kind] != expected[kind]:
             raise ValueError(f"{expected[kind]} {kind} stand in it, {found[kind]} can be read")
 
 
 def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the lines and arcs of a curve.
+    """Return the lines and arcs of a curve of ezdxf.
 
-    Args:
-        entity: the curve, an entity of ezdxf.
-        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, length. None: arcs may
-            not replace them, so they are unsupported.
-        name: beginning of the error message.
-
-    Raises:
-        InputError: the curve is damaged or unsupported; the message names it.
+    A damaged or unsupported curve is an InputError with its name; without `tolerance`, length, so are splines and
+    ellipses.
     """
     try:
         return _read(entity, tolerance, name)
@@ -89,13 +64,7 @@ def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return the lines and arcs of a DXF entity, made by the function for its kind.
 
-    Args:
-        entity: the entity of ezdxf.
-        tolerance: largest distance between a spline or an ellipse and the arcs that replace it, length, or None.
-        name: beginning of the error message.
-
-    Raises:
-        InputError: the kind is not supported, or the curve lies in another plane.
+    An unsupported kind, or a curve in another plane, is an InputError.
     """
     kind = entity.dxftype()
     if kind in _SKIPPED:
@@ -118,20 +87,15 @@ def _arc(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
 
 
 def _circle(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the arc of 360 degrees of a DXF entity CIRCLE, as a list.
-
-    `name` begins error messages, `tolerance` is not used.
-    """
+    """Return the arc of 360 degrees of a DXF entity CIRCLE, as a list."""
     return [Arc(_in_plane(entity.dxf.center, name), float(entity.dxf.radius), 0.0, TURN)]
 
 
 def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return the lines and arcs of a DXF polyline; `name` begins error messages, `tolerance` is not used.
 
-    Each point has a bulge: the tangent of a quarter of the angle of the arc that follows, negative if clockwise.
-
-    Raises:
-        InputError: the polyline is three-dimensional, a mesh, or fitted by a spline.
+    A bulge is the tangent of a quarter of the angle of the arc that follows, negative if clockwise. Three-dimensional,
+    mesh or spline polylines are an InputError.
     """
     if entity.dxftype() == "POLYLINE" and not entity.is_2d_polyline:
         raise InputError(f"{name} is a three-dimensional polyline or a mesh: draw it as a plane polyline")
@@ -161,8 +125,7 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
 def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return arcs along a DXF ellipse; their largest distance from it is `tolerance`, length.
 
-    Raises:
-        InputError: the ratio of the axes is not between 0 and 1, or `tolerance` is None; `name` begins the message.
+    No tolerance, or a ratio of axes not between 0 and 1, is an InputError.
     """
     _in_plane(entity.dxf.center, name), _in_plane(entity.dxf.major_axis, name)
     if not 0 < entity.dxf.ratio <= 1:
@@ -178,12 +141,9 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
 
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along the smooth parts of a DXF spline between its knots.
+    """Return arcs along the smooth parts of a DXF spline between its knots, up to a distance, length.
 
-    Their largest distance from the spline is `tolerance`, length.
-
-    Raises:
-        InputError: `tolerance` is None, or a point is outside the plane. The message begins with `name`.
+    No tolerance, or a point outside the plane, is an InputError.
     """
     for point in (*entity.control_points, *entity.fit_points):
         _in_plane(point, name)
@@ -214,8 +174,7 @@ def _is_visible(entity: Any, drawing: Any) -> bool:
 def unit(file: str) -> str | None:
     """Return the name of the unit of length that a DXF file states ($INSUNITS), or None.
 
-    Raises:
-        InputError: the file cannot be read, or the unit is not supported.
+    An unreadable file, or another unit, is an InputError.
     """
     import ezdxf
     try:
@@ -239,11 +198,7 @@ def _rows(points: Any) -> np.ndarray:
 
 
 def _required(tolerance: float | None, name: str) -> float:
-    """Return the tolerance for a curve that arcs must replace; name: beginning of the error message.
-
-    Raises:
-        InputError: the tolerance is None.
-    """
+    """Return the tolerance for a curve that arcs must replace; None is an InputError by name."""
     if tolerance is None:
         raise InputError(f"{name} is neither a straight line nor a circular arc: give tolerance=..., a length, and it"
                          f" is taken for arcs that close to it")

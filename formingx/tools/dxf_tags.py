@@ -23,19 +23,9 @@ _LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATT
 
 
 def check(file: str, others: tuple[str, ...]) -> Counter:
-    """Check that every curve of a drawing has all its data, and count the curves.
+    """Check that every curve of a drawing has all its data, and return {kind, such as "LINE": number of curves}.
 
-    Curves are lines, arcs, circles, polylines, ellipses and splines.
-
-    Args:
-        file: name of the file.
-        others: further kinds of entities that the drawing may contain, such as "3DFACE"; they are not examined.
-
-    Returns:
-        {kind of a curve, such as "LINE": number of curves}.
-
-    Raises:
-        ValueError: the drawing is damaged, or has an entity of an unknown kind; the message names the line.
+    `others` are kinds that are not examined. A damaged drawing or an unknown kind is a ValueError with the line.
     """
     data = Path(file).read_bytes()
     if data.startswith(b"AutoCAD Binary DXF"):
@@ -71,16 +61,9 @@ def check(file: str, others: tuple[str, ...]) -> Counter:
 
 
 def _check_entity(kind: str, tags: list[tuple[int, str]], line: int, others: tuple[str, ...]) -> None:
-    """Check the tags of one entity.
+    """Raise a ValueError with the line if an entity has an unknown kind, or a tag is missing or occurs twice.
 
-    Args:
-        kind: kind of the entity, such as "LINE".
-        tags: (group code, value) of each tag.
-        line: number of lines up to the end of the entity.
-        others: further kinds of entities that the drawing may contain, which are not examined.
-
-    Raises:
-        ValueError: the kind is unknown, or a tag is missing or occurs twice; the message names the line.
+    Tags are (group code, value); `others` are kinds that are not examined.
     """
     where = f"the {kind} that ends before line {line + 1}"
     if kind not in _NEEDED:

@@ -86,15 +86,9 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
 
 
 def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
-    """Return the tool, or the tool with its solid on the other side, so that the body lies outside.
+    """Return the tool, or the tool with its solid on the other side, so that a point or mesh lies outside.
 
-    Args:
-        tool: the tool.
-        body: a point (R, Z) of the body, or its mesh.
-        file: name of the file, for messages.
-
-    Raises:
-        InputError: the body lies on both sides of the profile.
+    A body on both sides of the profile is an InputError.
     """
     if hasattr(body, "nodes_of"):
         points = np.concatenate([body.nodes_of(name) for name in body.boundaries])
@@ -120,14 +114,8 @@ def _directed(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
 def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | Arc], bool]:
     """Return the pieces of all curves in order along the profile, and True if the profile is closed.
 
-    An open profile begins at one of its two free ends. Curves are reversed where necessary.
-
-    Args:
-        curves: lines and arcs of each curve.
-        file: name of the file, for messages.
-
-    Raises:
-        InputError: the curves do not form one line.
+    An open profile begins at a free end; curves are reversed where necessary. Curves that form no line are an
+    InputError.
     """
     from scipy.spatial import cKDTree
     curves = [pieces for pieces in curves if pieces]
@@ -165,11 +153,7 @@ def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | 
 
 
 def _tag(tag: Any) -> int:
-    """Return the number of a curve, an integer other than 0; a negative number reverses the curve.
-
-    Raises:
-        InputError: `tag` is no such number.
-    """
+    """Return the integer number of a curve, negative for a reversed one; 0 and others are an InputError."""
     number = finite("tools.read: number of a curve", tag)
     return int(math.copysign(count("tools.read: number of a curve", abs(number)), number))
 
@@ -177,13 +161,7 @@ def _tag(tag: Any) -> int:
 def _factor(units: Any, kind: str, file: str) -> float:
     """Return the factor by which the lengths of a file are multiplied.
 
-    Args:
-        units: argument `units` of `read`.
-        kind: format of the file, such as "dxf".
-        file: name of the file.
-
-    Raises:
-        InputError: the unit is unknown, or the file states no unit.
+    An unknown unit, or none in the file, is an InputError.
     """
     units = units.length if isinstance(units, Units) else units
     if not isinstance(units, str):

@@ -35,16 +35,9 @@ _ALLOWED = ("points, lines, circles, loops, surfaces, physical groups, mesh size
 
 
 def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
-    """Return the curves of a .geo file.
+    """Return {number of a curve: line, arc, or kind of another curve, such as "Spline"} of a .geo file.
 
-    Args:
-        file: name of the file.
-
-    Returns:
-        {number of a curve: a line or an arc, or the kind of another curve, such as "Spline"}.
-
-    Raises:
-        InputError: the file cannot be read, or contains a statement that is not supported; the message names the line.
+    An unreadable file, or an unsupported statement, is an InputError with the line.
     """
     file = os.fspath(file)
     try:
@@ -80,8 +73,7 @@ class _Drawing:
     def add(self, statement: str) -> None:
         """Add the point, curve or named number that one statement of the gmsh script defines.
 
-        Raises:
-            ValueError: the statement is not supported.
+        An unsupported statement is a ValueError.
         """
         if entity := _ENTITY.fullmatch(statement):
             kind, tag, numbers = entity[1], self._number(entity[2]), [self._number(n) for n in entity[3].split(",")]
@@ -98,10 +90,9 @@ class _Drawing:
             self.values[name.strip()] = self._number(value)
 
     def _add_point(self, tag: int, numbers: list[float]) -> None:
-        """Add the point with the number `tag`; `numbers`: (x, y, 0) or (x, y, 0, mesh size), length.
+        """Add point `tag` at (x, y, 0[, mesh size]), length.
 
-        Raises:
-            ValueError: the point lies outside the plane, or its number is used already.
+        A point outside the plane, or with a used number, is a ValueError.
         """
         if len(numbers) not in (3, 4) or numbers[2] != 0 or not all(map(math.isfinite, numbers)):
             raise ValueError("a point must be {x, y, 0} or {x, y, 0, mesh size}, finite numbers")
@@ -110,24 +101,16 @@ class _Drawing:
         self.points[tag] = np.array(numbers[:2])
 
     def _add_line(self, tag: int, numbers: list[float]) -> None:
-        """Add the line with the number `tag`; `numbers`: point numbers of its two ends.
-
-        Raises:
-            ValueError: there are not two numbers, there is no such point, or `tag` is used already.
-        """
+        """Add line `tag` between two point numbers; ValueError if there are others or the tag is used."""
         if len(numbers) != 2:
             raise ValueError("a line must be {first point, last point}")
         self._add_curve(tag, Line(*(self._point(n) for n in numbers)))
 
     def _add_circle(self, tag: int, numbers: list[float]) -> None:
-        """Add the circular arc with the number `tag`.
+        """Add the circular arc `tag`.
 
-        Of an arc below 180 degrees, `numbers` are the point numbers of the first end, the centre and the last end. Any
-        arc may have (x, y, 0, radius, first angle, last angle): the centre, length, and angles from the x axis,
-        radians. A full circle needs no angles.
-
-        Raises:
-            ValueError: the two ends differ in their distance from the centre, or the numbers do not define an arc.
+        Below 180 degrees it has the numbers of first end, centre and last end; any arc may have (x, y, 0, radius[,
+        first, last angle]), length and radians. Other numbers are a ValueError.
         """
         if len(numbers) == 3:
             first, centre, last = (self._point(n) for n in numbers)
@@ -145,21 +128,13 @@ class _Drawing:
             raise ValueError("a circle must be {first point, centre, last point}")
 
     def _add_curve(self, tag: int, piece: Line | Arc | str) -> None:
-        """Add a curve with the number `tag`; `piece`: line or arc, or the kind of another curve, such as "Spline".
-
-        Raises:
-            ValueError: the number is used already.
-        """
+        """Add a line, arc, or kind such as "Spline" with a tag; ValueError if it is used."""
         if tag in self.curves:
             raise ValueError(f"a second curve {tag}")
         self.curves[tag] = piece
 
     def _point(self, number: float) -> np.ndarray:
-        """Return the point (x, y) that the script numbers `number`, shape (2,), length.
-
-        Raises:
-            ValueError: there is no such point.
-        """
+        """Return point `number` (x, y), shape (2,), length; ValueError if there is none."""
         tag = self._tag(number)
         if tag not in self.points:
             raise ValueError(f"there is no point {tag}")
@@ -167,20 +142,15 @@ class _Drawing:
 
     @staticmethod
     def _tag(number: float) -> int:
-        """Return the number of a point or curve as an integer.
-
-        Raises:
-            ValueError: the number is not a positive integer.
-        """
+        """Return the number of a point or curve as a positive integer; otherwise a ValueError."""
         if number != int(number) or number < 1:
             raise ValueError(f"{number:g} is no number of a point or curve")
         return int(number)
 
     def _number(self, text: str) -> float:
-        """Return the value of an expression of a script: numbers, names, functions and + - * / ^.
+        """Return the value of an expression of numbers, names, functions and + - * / ^.
 
-        Raises:
-            ValueError: the expression contains anything else.
+        Anything else is a ValueError.
         """
         words = re.findall(r"(?<![\w.])[0-9.][\w.]*", text)            # Python takes 1_0, 0x10 and 1j for numbers
         if len(text) > 1000 or "**" in text or not re.fullmatch(r"[\w\s.+\-*/^()]*", text, re.ASCII) or not all(
@@ -191,8 +161,7 @@ class _Drawing:
     def _value(self, node: ast.expr) -> float:
         """Return the value of a node of the syntax tree of an expression.
 
-        Raises:
-            ValueError: the node is not a number, a known name or an operation.
+        A node that is not a number, a known name or an operation is a ValueError.
         """
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
             return float(node.value)
@@ -209,11 +178,7 @@ class _Drawing:
 
 
 def _real(value: Any) -> float:
-    """Return the result of an operation between numbers of a script, such as a power, as a float.
-
-    Raises:
-        ValueError: the result is complex: the operation is the root of a negative number.
-    """
+    """Return the result of an operation as a float; ValueError if it is complex."""
     if isinstance(value, complex):
         raise ValueError("a root of a negative number")
     return value

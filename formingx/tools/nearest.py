@@ -66,19 +66,10 @@ void nearest(long points, const double *x, long pieces, long lines, const double
 
 
 def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the signed distance of points from a profile, its gradient, and the curvature of its level lines.
+    """Return distances from a profile, (n,), gradients, (n, 2), curvatures of level lines, (n,), at x, (n, 2).
 
-    Args:
-        x: points, shape (n, 2), length.
-        table: the m pieces of the profile, lines first, shape (m, 9). A line has an origin (R, Z), a direction (R, Z),
-            0, lowest and highest length along it from the origin, 0, 0. An arc has its centre (R, Z), 0, 0, sense, 0,
-            angle of the arc, radius, polar angle of its first point. The sense is 1 if the arc turns left, else -1;
-            angles are in radians.
-        lines: number of lines.
-
-    Returns:
-        Distances, positive inside the tool, shape (n,), length; gradients, shape (n, 2); curvatures, shape (n,),
-        1/length.
+    Distances are positive inside. The table has m pieces, `lines` first, (m, 9): origin, direction, 0, lowest and
+    highest length, 0, 0 of a line; centre, 0, 0, sense (1: left), 0, angle, radius, first polar angle of an arc.
     """
     n = len(x)
     found = np.empty(4 * n)

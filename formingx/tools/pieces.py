@@ -77,16 +77,10 @@ class Arc(NamedTuple):
 
 
 def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -> list[Line | Arc]:
-    """Return the lines and tangent arcs of a polyline with fillets.
+    """Return the lines and tangent arcs of a polyline (n, 2), length, with a fillet radius for each corner.
 
-    Args:
-        points: corners (R, Z), shape (n, 2), length.
-        radii: fillet radius of each corner, length.
-        closed: True to join the last corner to the first.
-        each: True to refuse a fillet at a point where the polyline goes straight on; False to ignore this fillet.
-
-    Raises:
-        InputError: a fillet has no corner, or is too large.
+    `closed` joins the last corner to the first; `each` refuses a fillet at a straight point. A fillet without corner or
+    too large is an InputError.
     """
     n, size = len(points), float(np.ptp(points, axis=0).max())
     edges = [(i, (i + 1) % n) for i in range(n if closed else n - 1)]
@@ -129,19 +123,10 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
 
 def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn: float, first: bool,
             second: bool) -> Arc:
-    """Return the arc that rounds a corner between two edges.
+    """Return the arc that rounds a corner, (2,), between two edges, each shortened by `cut`, length.
 
-    At an open end on the axis R = 0, only one of the edges exists, and the other is its mirror image. There the half of
-    the arc on the side of the existing edge is returned.
-
-    Args:
-        corner: the corner (R, Z), shape (2,), length.
-        radius: radius of the arc, length.
-        cut: length by which the arc shortens each edge at the corner, length.
-        incoming: polar angle of the direction of the edge before the corner, radians.
-        turn: angle from this direction to the direction of the edge after the corner, positive to the left, radians.
-        first: True if the edge before the corner exists, False at the first point of an open profile.
-        second: True if the edge after the corner exists, False at the last point of an open profile.
+    Angles are in radians, the turn positive to the left. At an end on the axis one edge is the mirror image, and half
+    of the arc is returned.
     """
     side = math.copysign(1.0, turn)
     start = corner - cut * np.array([math.cos(incoming), math.sin(incoming)])
@@ -151,16 +136,9 @@ def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn
 
 
 def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[float]) -> None:
-    """Check that the fillets at the two ends of each edge fit on it.
+    """Raise an InputError if two fillets are together longer than their edge.
 
-    Args:
-        points: corners (R, Z), shape (n, 2), length.
-        radii: fillet radius of each corner, length.
-        lengths: {(first corner, last corner): length of the edge}.
-        cut: length by which the fillet at each corner shortens its edges, length.
-
-    Raises:
-        InputError: two fillets are together longer than their edge.
+    Corners have shape (n, 2); `cut` is the length by which a fillet shortens its edges.
     """
     for (i, j), length in lengths.items():
         if cut[i] + cut[j] > length * (1 + ROUND_OFF):
@@ -174,8 +152,7 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
 def checked(piece: Line | Arc, i: int) -> Line | Arc:
     """Return a piece of a profile with its numbers as floats; i: its number, for messages.
 
-    Raises:
-        InputError: the piece is neither a line nor an arc, is not finite, or has no length.
+    A piece that is no line or arc, not finite, or of length 0 is an InputError.
     """
     caller = f"Tool: piece {i}"
     if isinstance(piece, Line):
@@ -194,12 +171,7 @@ def checked(piece: Line | Arc, i: int) -> Line | Arc:
 
 
 def turn_angle(incoming: float, outgoing: float) -> float:
-    """Return the angle from one direction to the next along a profile, positive to the left, radians, in (-pi, pi].
-
-    Args:
-        incoming: polar angle of the first direction, radians.
-        outgoing: polar angle of the second direction, radians.
-    """
+    """Return the angle between polar angles of directions, positive to the left, radians, in (-pi, pi]."""
     return math.pi - (math.pi - (outgoing - incoming)) % TURN
 
 

@@ -107,15 +107,9 @@ class Tool:
         return tool
 
     def _set_pieces(self, pieces: list[Line | Arc], closed: bool) -> None:
-        """Store the lines and arcs of the profile, checked.
+        """Store the lines and arcs of the profile, `closed` if the last point is the first.
 
-        Args:
-            pieces: the lines and arcs in order.
-            closed: True if the last point is the first.
-
-        Raises:
-            InputError: there is no piece, or the pieces do not follow one another. The profile doubles back or crosses
-                itself.
+        No piece, a gap, a reversal or a crossing of the profile is an InputError.
         """
         pieces = [checked(piece, i) for i, piece in enumerate(pieces)]
         if not pieces:
@@ -265,12 +259,9 @@ class Tool:
         self.table = np.array([(*row, 0.0, 0.0) for row in rows] + arcs)
 
     def _ends(self) -> tuple:
-        """Return the corners that the profile and its mirror image form on the axis R = 0.
+        """Return (point (R, Z), angle) of the corner with the mirror image at the axis for both ends, or None each.
 
-        Returns:
-            Two entries, for the first and the last end of the profile. An entry is (point (R, Z), angle) with the angle
-            by which the direction turns there, positive to the left, radians. It is None for an end off the axis, or
-            without a corner. For a closed profile both entries have the angle 0, which stands for no corner.
+        The direction turns by this angle, positive to the left, radians; a closed profile has 0, no corner.
         """
         if self.closed:
             return (np.zeros(2), 0.0), (np.zeros(2), 0.0)
@@ -284,11 +275,7 @@ class Tool:
         return tuple(found)
 
     def _check_crossing(self) -> None:
-        """Check that the profile does not cross itself.
-
-        Raises:
-            InputError: two pieces cross.
-        """
+        """Raise an InputError if two pieces of the profile cross."""
         parts = [sampled(p, number_of_chords(p)) for p in self.pieces]
         a = np.concatenate([part[:-1] for part in parts])
         b = np.concatenate([part[1:] for part in parts])

@@ -265,11 +265,7 @@ def pot(*, mouth: float, base: float, depth: float, sheet: float, fillet: float,
 
 
 def _draft(shape: str, draft: float) -> float:
-    """Return the draft angle of a shape in radians, from degrees; shape: name for messages.
-
-    Raises:
-        InputError: the angle is negative, or 90 degrees or more.
-    """
+    """Return the draft angle in radians, from degrees; InputError unless it is from 0 to below 90."""
     angle = non_negative(f"{shape}: draft", draft)
     if angle >= 90:
         raise InputError(f"{shape}: draft = {draft!r}: must be below 90 degrees")
