@@ -35,20 +35,10 @@ class CsvTable(NamedTuple):
     kinds: list[str] | None = None
 
     def take(self, column: str, requested: float | str | None = None) -> np.ndarray:
-        """Return the values of a column, converted to a unit.
+        """Return the values of a column, shape (n,), converted to a unit or multiplied by a factor.
 
-        Args:
-            column: name of the column.
-            requested: unit of the returned values, to which they are converted from the unit in the header; or a factor
-                by which the values are multiplied. None: the values are returned as they are, if the header states
-                no unit.
-
-        Returns:
-            The values, shape (n,).
-
-        Raises:
-            InputError: there is no such column, or a cell is empty or not a finite number. A unit is unknown, is
-                missing in the header, or stands there although `requested` is None.
+        None keeps the values of a column without unit. A missing column, a cell that is no finite number, or a wrong
+        unit is an InputError.
         """
         check_name(f"{self.name}: column", column, self.columns)
         values, unit = self.columns[column], self.units[column]
@@ -71,12 +61,7 @@ class CsvTable(NamedTuple):
 def conversion(unit: str, requested: str) -> float:
     """Return the factor that converts numbers from one unit to another, for example 10 from "cm" to "mm".
 
-    Args:
-        unit: name of the unit of the numbers.
-        requested: name of the unit to which they are converted.
-
-    Raises:
-        InputError: a unit is unknown, or the units measure different quantities.
+    An unknown unit, or units of different quantities, are an InputError.
     """
     if unit == requested:
         return 1.0
@@ -93,14 +78,8 @@ def conversion(unit: str, requested: str) -> float:
 def read(file: Any) -> CsvTable:
     """Return the table in a CSV file with its units; columns without any number are left out.
 
-    The first row is the header: it names the columns, with units in brackets, as in "pressure [psi]".
-
-    Args:
-        file: name of the file.
-
-    Raises:
-        InputError: the file cannot be read, has no header, or has fewer than two rows of data. It names a
-            column twice, or has a row with more or fewer cells than the header.
+    The first row names the columns, with units as in "pressure [psi]". A file without, with a name twice, fewer than
+    two rows, or a ragged row is an InputError.
     """
     name = os.fspath(file_path("table", file))
     cells = records(name)
@@ -124,20 +103,10 @@ def read(file: Any) -> CsvTable:
 
 
 def records(file: Any) -> list[tuple[int, list[str]]]:
-    """Return the cells of a CSV file as text; decimal commas are replaced by points.
+    """Return (line number, cells as text) of each row of a CSV file, with points for decimal commas.
 
-    Cells are separated by semicolons or tabs if the first line, or more than half of the lines, contain one outside
-    quotes, otherwise by commas. Empty lines, and lines that begin with #, are skipped. Between commas, a number with a
-    decimal comma must be in quotes. The text is UTF-8, UTF-16, or else Windows-1252.
-
-    Args:
-        file: name of the file.
-
-    Returns:
-        For each row its line number in the file and its cells.
-
-    Raises:
-        InputError: the file cannot be read, quotes do not match, or some numbers have commas and others points.
+    Cells are separated by semicolons or tabs, if the first line or half of the lines contain one, otherwise by commas.
+    Empty lines and those from # are skipped. Unreadable files, quotes or mixed decimals are an InputError.
     """
     name = os.fspath(file)
     try:
@@ -174,8 +143,7 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
 def _decoded(content: bytes) -> str:
     """Return the bytes of a file as text: UTF-16 with its mark or with many zero bytes, UTF-8, or else Windows-1252.
 
-    Raises:
-        UnicodeDecodeError: the bytes are none of these.
+    Other bytes raise a UnicodeDecodeError.
     """
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16")
@@ -201,14 +169,9 @@ def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
 
 
 def from_arrays(name: str, columns: Mapping[str, Any]) -> CsvTable:
-    """Return a table made from arrays, without units.
+    """Return a table of {column: values, shape (n,)}, n at least 2, without units; `name` is for messages.
 
-    Args:
-        name: name of the table, for messages.
-        columns: {name of a column: values, shape (n,)}, n at least 2.
-
-    Raises:
-        InputError: a column does not hold numbers, or the lengths differ or are below 2.
+    Values that are no numbers, or of other lengths, are an InputError.
     """
     arrays = {}
     for key, values in columns.items():
@@ -224,14 +187,7 @@ def from_arrays(name: str, columns: Mapping[str, Any]) -> CsvTable:
 
 
 def name_and_unit(cell: str) -> tuple[str, str | None]:
-    """Return the name and the unit of a column from its cell in the header.
-
-    For example, "pressure [psi]" gives ("pressure", "psi"). The unit is None without brackets, and if the brackets are
-    empty or contain "-" or "1".
-
-    Args:
-        cell: text of the cell.
-    """
+    """Return name and unit of a cell in the header, as ("pressure", "psi") of "pressure [psi]", or None. """
     found = re.fullmatch(r"(.*?)\s*[\[(]\s*([^\])]*?)\s*[\])]", cell)
     if not found or not found[1]:
         return cell, None

@@ -11,37 +11,19 @@ _NUMBER = re.compile(rf"(?:{_WHOLE}(?:\.[0-9]*)?|[+-]?\.[0-9]+)(?:[eE]{_WHOLE})?
 
 
 def is_number(word: str) -> bool:
-    """Return True if a text is a number: decimal digits with a point and an exponent, "nan" or "inf".
-
-    Args:
-        word: text without spaces.
-    """
+    """Return True if a word is decimal digits with a point and an exponent, "nan" or "inf"."""
     return _NUMBER.fullmatch(word) is not None
 
 
 def number(word: str) -> float:
-    """Return the number that a text stands for.
-
-    Args:
-        word: text without spaces, such as "1.5e-3".
-
-    Raises:
-        ValueError: the text is not a number.
-    """
+    """Return the number of a word, such as "1.5e-3"; otherwise a ValueError."""
     if not is_number(word):
         raise ValueError(f"{word[:40]!r} is not a number")
     return float(word)
 
 
 def whole(word: str) -> int:
-    """Return the integer that a text stands for.
-
-    Args:
-        word: text without spaces, such as "-12".
-
-    Raises:
-        ValueError: the text is not an integer, or has more than 18 digits.
-    """
+    """Return the integer of a word of at most 18 digits, such as "-12"; otherwise a ValueError."""
     if not re.fullmatch(r"[+-]?[0-9]{1,18}", word):
         raise ValueError(f"{word[:40]!r} is not a whole number")
     return int(word)

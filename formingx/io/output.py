@@ -15,16 +15,8 @@ from ..errors import file_path
 def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
     """Write a file under a temporary name, then rename it, so that no other program reads an incomplete file.
 
-    If writing fails, an earlier file of that name is kept. A new file gets mode and owner of the earlier one. Symbolic
-    links are followed. An existing device or pipe is written to directly.
-
-    Args:
-        file: name of the file; missing folders are created.
-        write: function that writes the content to a stream, its argument.
-        mode: "w" for text (UTF-8), "wb" for bytes.
-
-    Raises:
-        OSError: the file cannot be written; the message names it. No partial file remains.
+    `write` writes to a stream, "w" for text or "wb" for bytes. If it fails, the earlier file is kept, and an OSError
+    names the file. Mode and owner are kept, links followed, devices written directly.
     """
     file = file_path("file", file)
     target = Path(os.path.realpath(file))

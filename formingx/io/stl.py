@@ -15,26 +15,17 @@ def volume(points: np.ndarray, triangles: np.ndarray) -> float:
     .. math::
         V = \frac{1}{6} \sum a \cdot (b \times c)
 
-    Args:
-        points: corners of the triangles, shape (n, 3), length.
-        triangles: for each triangle the row numbers of its corners in `points`, shape (m, 3), counter-clockwise seen
-            from outside. If they are clockwise, the volume is negative.
+    The corners have shape (n, 3), length, the triangles (m, 3). Clockwise ones, seen from outside, give a negative
+    volume.
     """
     a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
     return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 
 
 def write_stl(points: np.ndarray, triangles: np.ndarray, file: Any) -> None:
-    """Write a surface of triangles as binary STL.
+    """Write points (n, 3), length, and triangles (m, 3), counter-clockwise seen from outside, as binary STL.
 
-    Args:
-        points: corners of the triangles, shape (n, 3), length.
-        triangles: for each triangle the row numbers of its corners in `points`, shape (m, 3), counter-clockwise seen
-            from outside.
-        file: name of the file.
-
-    Raises:
-        OSError: the file cannot be written.
+    A failed file is an OSError.
     """
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
