@@ -32,21 +32,9 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
     Here :math:`l_i` is the principal stretch of the body, w_i the elastic strain and tau the relaxation time of a
     branch. The flow law of the material is f, for example :math:`f_i = e^{2 w_i} - \tfrac{1}{3} \sum_j e^{2 w_j}`.
 
-    Args:
-        flow: flow law f, a function from w to f(w), both of shape (branches, 3), dimensionless.
-        tau: relaxation times, shape (branches,), time.
-        mode: "uniaxial", "pure_shear" or "equibiaxial".
-        times: times, shape (n,), not descending.
-        stretches: stretches in the loaded direction at these times, shape (n,). The first stretch is applied suddenly
-            to a body in the reference configuration; a second stretch at the same time is a jump.
-        between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
-        accuracy: relative tolerance of the integration, `rtol` of `scipy.integrate.solve_ivp`.
-
-    Returns:
-        Elastic strains w in the three principal directions, shape (n, branches, 3).
-
-    Raises:
-        ConvergenceError: the integration stopped before the last time.
+    Branches have relaxation times (branches,), and f maps w to f(w), both (branches, 3). Times and stretches have shape
+    (n,); two stretches at one time are a jump, and `between` has a constant rate, "stretch" or "strain". The result has
+    shape (n, branches, 3); a ConvergenceError says where the integration stopped.
     """
     from scipy.integrate import solve_ivp
     check_name("elastic_strains: mode", mode, MODES)
@@ -75,20 +63,10 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
 
 def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Check the arguments of a homogeneous test with given stretches over time.
+    """Return times and stretches of a homogeneous test as arrays, shape (n,) each, checked.
 
-    Args:
-        name: beginning of the error messages.
-        mode: "uniaxial", "pure_shear" or "equibiaxial".
-        times: times, shape (n,), not descending.
-        stretches: stretches in the loaded direction at these times, shape (n,), positive.
-        between: quantity with a constant rate between two times, "stretch" or "strain" (logarithmic).
-
-    Returns:
-        Times and stretches as arrays, shape (n,) each.
-
-    Raises:
-        InputError: an unknown mode or `between`, different shapes, descending times, or a stretch that is not positive.
+    An unknown mode or `between` ("stretch" or "strain"), other shapes, descending times or stretches that are not
+    positive are an InputError.
     """
     check_name(f"{name}: mode", mode, MODES)
     check_name(f"{name}: between", between, BETWEEN)

@@ -23,21 +23,10 @@ _STRETCH_FRACTION = 0.97
 
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
           unit_of_time: str) -> Path:
-    """Write an HTML page with stress-stretch curves and the limits of a material.
+    """Write an HTML page with stress-stretch curves and the limits of a material, and return its path.
 
-    Args:
-        material: the material.
-        file: name of the HTML file.
-        temperatures: temperatures at which curves are drawn, if a constant depends on the temperature.
-        rates: Hencky rates at which curves are drawn, 1/time, if the material relaxes.
-        unit: unit of stress, for labels.
-        unit_of_time: unit of time, for labels.
-
-    Returns:
-        Path of the file.
-
-    Raises:
-        InputError: a constant depends on the temperature, and no temperatures are given.
+    Curves are drawn at temperatures and Hencky rates, 1/time, with units in labels. Missing temperatures of a dependent
+    constant are an InputError.
     """
     caller, path = f"{material}: report", file_path("report: file", file)
     depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
@@ -95,15 +84,10 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
 
 
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
-    """Return a PNG image, base64-encoded, with curves of true stress against stretch.
+    """Return a PNG image, base64-encoded, with true stress over stretch in three tests.
 
-    It has a diagram each for uniaxial tension, pure shear and equibiaxial tension.
-
-    Args:
-        cases: (temperature as text, material, factor of the relaxation times) for each temperature.
-        rates: Hencky rates, 1/time; empty for a material that does not relax.
-        unit: unit of stress, for labels.
-        unit_of_time: unit of time, for labels.
+    Cases are (temperature as text, material, factor of relaxation times); rates are Hencky rates, 1/time, none without
+    relaxation.
     """
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):

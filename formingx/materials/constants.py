@@ -82,22 +82,14 @@ class Varying(ABC):
 class OfPosition(Varying):
     """Material constant that is a function f(R, Z) of the reference position.
 
-    Args:
-        function: function f of two arrays, shape (n,), length; it returns the constant at these n points, shape (n,).
+    The function takes two arrays, shape (n,), length, and returns the constant, shape (n,).
     """
 
     def __init__(self, function: Callable):
         self.function = function
 
     def __call__(self, *coordinates: np.ndarray) -> np.ndarray:
-        """Return the constant at reference positions, checked to be finite.
-
-        Args:
-            coordinates: R and Z, in three dimensions x, y and z, shape (n,) each, length.
-
-        Returns:
-            Values, shape (n,).
-        """
+        """Return the constant at R and Z, or x, y and z, (n,) each, length, checked to be finite, shape (n,)."""
         return self.at(dict(zip("RZ" if len(coordinates) == 2 else "xyz", coordinates)))
 
     def at(self, coordinates: dict[str, np.ndarray]) -> np.ndarray:
@@ -184,11 +176,7 @@ def entropic(value: float, reference: float, *, unit: str) -> OfTemperature:
 
 
 class OfMesh(Varying):
-    """Material constant that is a UFL expression of the scene's own mesh.
-
-    Args:
-        expression: the UFL expression, a scalar.
-    """
+    """Material constant that is a UFL expression of the scene's own mesh. The expression is a scalar."""
 
     def __init__(self, expression: Any):
         self._expression = expression
@@ -208,14 +196,9 @@ class OfMesh(Varying):
 
 
 def varying(value: Any) -> Varying | None:
-    """Return a constant that varies over the body as an object of `Varying`.
+    """Return a constant as an object of `Varying`; None for a number.
 
-    Args:
-        value: the constant: a number, a function f(R, Z) of the reference position, a UFL expression, a `table` over
-            the temperature, or an object of `Varying`.
-
-    Returns:
-        The object, or None if the constant is a number.
+    It may be a function f(R, Z), a UFL expression, or a `table` over the temperature.
     """
     if isinstance(value, Varying):
         return value

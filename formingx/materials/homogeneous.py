@@ -114,12 +114,8 @@ def in_plane_stretches(mode: str, stretches: Any) -> np.ndarray:
 
     .. math:: l_1 = l, \qquad l_2 = l^k
 
-    Args:
-        mode: "uniaxial" (k = -1/2), "pure_shear" (k = 0) or "equibiaxial" (k = 1).
-        stretches: stretches l in the loaded direction, shape (n,).
-
-    Returns:
-        Stretches (l1, l2), shape (2, n).
+    Stretches l have shape (n,), and k is -1/2 ("uniaxial"), 0 ("pure_shear") or 1 ("equibiaxial"); the result has shape
+    (2, n).
     """
     l = np.asarray(stretches, float)
     return np.stack([l, l ** MODES[mode]])
@@ -172,20 +168,10 @@ class MaterialStability(NamedTuple):
 
 
 def stability(response: Response, constants: Any, low: float, high: float) -> MaterialStability:
-    """Return the ranges of stretch in which a material is stable in uniaxial tension, pure shear, equibiaxial tension.
+    """Return the ranges of stretch around 1 in which a material is stable in three homogeneous tests.
 
-    A range extends from the stretch 1 to both sides, as far as a criterion holds. The criteria are a finite stress, a
-    force that increases with the stretch, and Drucker's criterion. The end of a range is searched for at 400 stretches
-    of equal ratio, then by bisection.
-
-    Args:
-        response: derivatives of the energy of the material.
-        constants: values of the constants, numbers, in the order in which `response` was given their names.
-        low: lowest examined stretch, at most 1.
-        high: highest examined stretch, 1 or larger.
-
-    Returns:
-        The examined range and, for each criterion, {test: (lowest, highest stretch)}.
+    The criteria are a finite stress, an increasing force and Drucker's. Ends are searched for at 400 stretches of equal
+    ratio from `low` to `high`, then by bisection. Constants have the order of `response`.
     """
     constants = list(constants)
 
@@ -223,9 +209,7 @@ def stability(response: Response, constants: Any, low: float, high: float) -> Ma
 class _Program:
     """Scalar UFL expressions as a list of numpy operations, with common parts evaluated once.
 
-    Args:
-        inputs: UFL constants whose values a call takes: three stretches, then the constants of an energy.
-        outputs: the UFL expressions.
+    The inputs are three stretches, then the constants of an energy.
     """
 
     def __init__(self, inputs: list, outputs: list):
@@ -244,12 +228,7 @@ class _Program:
 
     @np.errstate(all="ignore")
     def __call__(self, stretches: np.ndarray, constants: Any) -> np.ndarray:
-        """Return the values of the UFL expressions, shape (outputs, n).
-
-        Args:
-            stretches: principal stretches, shape (3, n).
-            constants: constants of the energy, in the order of `inputs`, each a number or of shape (n,).
-        """
+        """Return the values (outputs, n) at stretches (3, n), with constants as numbers or of shape (n,)."""
         values = [*stretches, *constants]
         for operation, operands in self._steps:
             values.append(operation(*[values[i] for i in operands]))
@@ -258,11 +237,9 @@ class _Program:
 
 @functools.lru_cache
 def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
-    """Return two programs for the derivatives of an energy W by the principal stretches.
+    """Return programs of the first, and of the first and second derivatives of W by principal stretches.
 
-    The first has three outputs, the first derivatives. The second has nine: the first derivatives, then the second
-    derivatives 11, 12, 13, 22, 23, 33. W is a UFL expression of `_STRETCHES` and of the first n entries of
-    `_CONSTANTS`.
+    They have 3 and 9 outputs (11, 12, 13, 22, 23, 33 last). W depends on `_STRETCHES` and n `_CONSTANTS`.
     """
     inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
     W = expand_indices(expand_derivatives(W))

@@ -29,10 +29,8 @@ class Peak(NamedTuple):
 class FreeInflation:
     """Free inflation of a thin tube or disc of incompressible layers.
 
-    Args:
-        layers: pairs (material, reference thickness of the layer in units of length), one for each layer. All constants
-            of the materials are numbers.
-        radius: mean reference radius of the tube, or radius of the opening over which the disc is supported, length.
+    Layers are (material, reference thickness in units of length) with constants that are numbers; the radius is the
+    mean of the tube or that of the opening, length.
     """
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):
@@ -50,11 +48,7 @@ class FreeInflation:
         P are nominal stresses, h0 is the reference thickness and R the reference radius. For several layers P h0 is a
         sum over the layers.
 
-        Args:
-            hoop: hoop stretches, shape (n,).
-
-        Returns:
-            Pressures, shape (n,), stress; infinite beyond the largest stretch of a material.
+        Hoop stretches have shape (n,); pressures beyond the largest stretch of a material are infinite.
         """
         low, high = np.full_like(hoop, 0.5), hoop + 1.0
         for _ in range(_HALVINGS):
@@ -76,11 +70,7 @@ class FreeInflation:
         For several layers P h0 is a sum over the layers. The maximum of the pressure is 2 to 3 % below the maximum for
         a hinged neo-Hookean disc.
 
-        Args:
-            stretch: stretches l, shape (n,), 1 or larger.
-
-        Returns:
-            Pressures, shape (n,), stress; infinite beyond the largest stretch of a material.
+        Stretches l have shape (n,), 1 or larger; pressures beyond the largest stretch of a material are infinite.
         """
         force = self._forces(in_plane_stretches("equibiaxial", stretch))[0]
         found = 4 * np.sqrt(stretch**2 - 1) * force / (self._radius * stretch**3)
@@ -93,14 +83,7 @@ class FreeInflation:
 
 
 def first_peak(pressure: Callable[[np.ndarray], np.ndarray]) -> Peak | None:
-    """Find the first maximum of the pressure in free inflation, for stretches from 1 to 20.
-
-    Args:
-        pressure: function from stretches, shape (n,), to pressures, shape (n,), stress.
-
-    Returns:
-        The maximum; None if the pressure increases throughout.
-    """
+    """Return the first maximum of a pressure, a function of stretches (n,), from 1 to 20, or None."""
     stretches = np.geomspace(1.0 + 1e-6, 20.0, 2000)
     found = pressure(stretches)
     found = found[: int(np.argmin(np.append(np.isfinite(found), False)))]    # below the limit of the materials

@@ -126,10 +126,9 @@ class Material(Energies):
         return self._moduli(values, values.shape[1])[1]
 
     def _moduli(self, constants: Any, n: int) -> np.ndarray:
-        """Return the smallest and the largest small-strain shear modulus for n sets of constants, shape (2, n), stress.
+        """Return the smallest and largest small-strain shear modulus for n sets of constants, (2, n), stress.
 
-        The moduli hold for strains along the axes of the section; they are equal for an isotropic material. `constants`
-        has one entry for each constant, in the order of `parameters`: a number or an array of shape (n,).
+        They hold for strains along the axes of the section; `constants` follow `parameters`, numbers or shape (n,).
         """
         H = self.response.logarithmic(np.ones((2, n)), constants)[1] / 2
         a, b = (H[0, 0] - 2 * H[0, 1] + H[1, 1]) / 2, (H[0, 0] + 2 * H[0, 1] + H[1, 1]) / 6
@@ -429,12 +428,5 @@ class Material(Energies):
 
 
 def brief(value: Any) -> str:
-    """Return the value of a constant as text, a number with six significant digits.
-
-    Args:
-        value: the value.
-
-    Returns:
-        The text.
-    """
+    """Return the value of a constant as text, a number with six significant digits."""
     return repr(float(f"{value:.6g}")) if isinstance(value, float) else repr(value)

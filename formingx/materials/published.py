@@ -38,14 +38,7 @@ _MORE: list[Callable[[], dict[str, Published]]] = []
 
 
 def register_published(constants: Callable[[], dict[str, Published]]) -> Callable[[], dict[str, Published]]:
-    """Add the published constants of an extension to the result of `published`; usable as a decorator.
-
-    Args:
-        constants: function without arguments that returns {name: `Published`}.
-
-    Returns:
-        The same function.
-    """
+    """Add {name: `Published`} of a function to the result of `published`; usable as a decorator."""
     _MORE.append(constants)
     return constants
 

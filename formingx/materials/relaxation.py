@@ -12,36 +12,16 @@ from .material import Material
 
 
 def checked_shift(name: str, shift: Any) -> Callable:
-    """Check that the temperature dependence of relaxation times is a function.
-
-    Args:
-        name: beginning of the error message.
-        shift: law aT(T), the factor of the relaxation times at the temperature T.
-
-    Returns:
-        The argument `shift`.
-
-    Raises:
-        InputError: `shift` is not callable.
-    """
+    """Return the law aT(T) of relaxation times; InputError by name unless it is callable."""
     if not callable(shift):
         raise InputError(f"{name}: shift = {shift!r}: must be WLF(...), Arrhenius(...) or a function of temperature")
     return shift
 
 
 def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
-    """Check a list of pairs of constants, such as moduli and relaxation times.
+    """Return pairs of constants, such as moduli and relaxation times, as lists.
 
-    Args:
-        name: beginning of the error messages.
-        pairs: the pairs, at least one.
-        what: names of the two entries of a pair, for the error messages, such as "mu, tau".
-
-    Returns:
-        The pairs as lists.
-
-    Raises:
-        InputError: `pairs` is empty, or an entry is not a pair.
+    An empty list, or an entry that is no pair, is an InputError with `what`.
     """
     found = as_list(name, pairs, f"({what})")
     if not found:
@@ -128,19 +108,13 @@ class RelaxingMaterial(Material):
         return None if self._equilibrium is None else self._relaxed_energy(F, constants)
 
     def _relaxed_energy(self, F: Any, constants: dict[str, Any]) -> Any:
-        """Return the energy after complete relaxation at F (UFL, stress), from {name: value} of all constants.
-
-        It is 0 if all stress relaxes.
-        """
+        """Return the relaxed energy at F (UFL, stress), from {name: value} of constants; 0 if none stays."""
         if self._equilibrium is None:
             return 0
         return self._equilibrium.strain_energy(F, **{k: constants[k] for k in self._equilibrium.parameters})
 
     def _relaxed_stress(self, mode: str, stretches: Any) -> Any:
-        """Return the nominal stress after complete relaxation in the test `mode`, of the shape of `stretches`, stress.
-
-        It is 0 if all stress relaxes.
-        """
+        """Return the relaxed nominal stress in a test, of the shape of `stretches`; 0 if none stays."""
         return 0.0 if (rest := self.equilibrium) is None else rest.stress(mode, stretches)
 
     @property

@@ -343,70 +343,33 @@ class GeneralisedMaxwell(RelaxingMaterial):
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
-        """Return the earlier deformation that the step of every branch needs (UFL), or None if it needs none.
-
-        By default it is the isochoric right Cauchy-Green tensor at the beginning of the step, its entries (11, 22, 12,
-        33). `internal` is {name: internal variable there}, and `time_step` the length of the step.
-        """
+        """Return the earlier deformation (UFL) that a step of the branches needs, by default C at its start; or None."""
         return entries(internal["C"]) if self._stores_C else None
 
     def _deformation_history(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
-        """Return {name: value at the end of the step} of the internal variables that describe the past deformation.
-
-        The internal variables of the branches are not among them. By default the only one is C, the isochoric right
-        Cauchy-Green tensor.
-
-        Args:
-            C: this tensor at the end of the step, entries (11, 22, 12, 33).
-            internal: {name: internal variable at the beginning of the step}.
-            time_step: length of the step (UFL scalar, time).
-        """
+        """Return {name: value after the step} of internal variables of past deformation, by default C alone."""
         return {"C": C} if self._stores_C else {}
 
     # the law of a branch: A is its internal variable, C the isochoric right Cauchy-Green tensor, both as entries
 
     def _metric(self, A: Entries) -> Entries:
-        """Return the tensor M of a branch with the internal variable A, both as entries (11, 22, 12, 33).
-
-        M is the inverse of A for `Viscoelastic`, and A for `TransientNetwork`. With the isochoric deformation gradient
-        F, the elastic left Cauchy-Green tensor of the branch is F M F^T.
-        """
+        """Return the tensor M of a branch with internal variable A: F M F^T is its elastic left Cauchy-Green tensor."""
         raise NotImplementedError
 
     def _stored(self, C: Entries, A: Entries) -> Any:
-        """Return the stored energy of a branch, divided by half its shear modulus (UFL).
-
-        C is the isochoric right Cauchy-Green tensor and A the internal variable, both as entries (11, 22, 12, 33).
-        """
+        """Return the stored energy of a branch over half its shear modulus, of C and internal variable A (UFL)."""
         raise NotImplementedError
 
     def _dissipated(self, C: Entries, A: Entries) -> Any:
-        """Return the dissipated power of a branch, divided by mu/(2 tau), its shear modulus mu and relaxation time tau.
-
-        C is the isochoric right Cauchy-Green tensor and A the internal variable, both as entries (11, 22, 12, 33).
-        """
+        """Return the dissipated power of a branch over mu/(2 tau), of C and internal variable A (UFL)."""
         raise NotImplementedError
 
     def _step(self, C: Entries, past: Any, A: Entries, x: Any) -> Any:
-        """Return the potential of a branch in a step, divided by half its shear modulus (UFL).
-
-        The derivative of the potential by F is the nominal stress at the end of the step.
-
-        Args:
-            C: isochoric right Cauchy-Green tensor at the end of the step, entries (11, 22, 12, 33).
-            past: earlier deformation that the step needs, the result of `_past`.
-            A: internal variable at the beginning of the step, entries (11, 22, 12, 33).
-            x: length of the step over the relaxation time.
-        """
+        """Return the step potential (UFL) over half the modulus of a branch; its derivative by F is the stress."""
         raise NotImplementedError
 
     def _advanced(self, C: Entries, past: Any, A: Entries, x: Any) -> Entries:
-        """Return the internal variable of a branch at the end of a step, entries (11, 22, 12, 33).
-
-        The arguments are C at the end of the step, the result `past` of `_past`, and A at the beginning. C is the
-        isochoric right Cauchy-Green tensor and A the internal variable, both as entries (11, 22, 12, 33). The length of
-        the step over the relaxation time is x.
-        """
+        """Return the internal variable of a branch after a step of x relaxation times, from C then, `past` and A."""
         raise NotImplementedError
 
     @staticmethod
@@ -428,9 +391,6 @@ class GeneralisedMaxwell(RelaxingMaterial):
 
 
 def _shifted(name: str, tau: Any, shift: Any) -> OfTemperature:
-    """Return the relaxation time aT(T) tau as a function of the temperature; `shift` is the law aT.
-
-    `name` is the name of the constant, for error messages.
-    """
+    """Return the relaxation time aT(T) tau as a function of the temperature; `shift` is the law aT."""
     shift, tau = checked_shift(name, shift), positive(name, tau)
     return OfTemperature(lambda T: tau * shift(T), f"{tau!r} * {shift!r}", getattr(shift, "limits", None))

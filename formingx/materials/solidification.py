@@ -196,14 +196,10 @@ class Solidification(Material):
         return self._base.dissipation(F, self._of_base_internal(internal), **self._of_base(constants))
 
     def _begin(self, internal: dict[str, Any], constants: dict[str, Any]) -> tuple[Any, Any, Any]:
-        """Return the tensor A and the solidified fraction phi at the beginning of a step, and phi at its end (UFL).
+        """Return A and the solidified fraction phi at the beginning of a step, and phi at its end (UFL).
 
-        A, entries (11, 22, 12, 33), is the integral of C^-1 over the solidified fraction, with the isochoric right
-        Cauchy-Green tensor C. It includes the material that solidified in the previous step.
-
-        Args:
-            internal: {name: internal variable at the beginning of the step}.
-            constants: {name: value at the end of the step, or in its middle for `flow_constants`}.
+        A, entries (11, 22, 12, 33), is the integral of C^-1 over the solidified fraction, that of the previous step
+        included.
         """
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)
@@ -229,13 +225,7 @@ class Solidification(Material):
 
 
 class _Fraction:
-    """Solidified fraction phi as a function of the temperature, constant below `low` and above `high`.
-
-    Args:
-        low: highest temperature at which phi is 1.
-        high: lowest temperature at which phi is 0.
-        table: phi over the temperature, from `low` to `high`; None: phi is linear.
-    """
+    """Solidified fraction phi as a function of the temperature, constant below `low` and above `high`."""
 
     def __init__(self, low: float, high: float, table: Table | None = None):
         self._low, self._high, self._table = low, high, table
@@ -249,14 +239,9 @@ class _Fraction:
 
 
 def _fraction(between: Any, fraction: Any) -> _Fraction:
-    """Return the solidified fraction as a function phi(T) of the temperature, from one of two arguments.
+    """Return the solidified fraction phi(T), from two temperatures or a `table`.
 
-    Args:
-        between: two temperatures, the lower first, between which phi decreases from 1 to 0; or None.
-        fraction: `table` of phi over T, from 1 to 0; or None.
-
-    Raises:
-        InputError: none or both are given, or the one that is given is not allowed.
+    Between the two, the lower first, phi decreases from 1 to 0. None, both or a wrong argument is an InputError.
     """
     if (between is None) == (fraction is None):
         raise InputError(f"Solidification: between = {between!r}, fraction = {fraction!r}: give one of them: the"
@@ -275,8 +260,5 @@ def _fraction(between: Any, fraction: Any) -> _Fraction:
 
 
 def _remaining(before: Any, after: Any) -> Any:
-    """Return the ratio of the solidified material that remains, when its fraction changes from `before` to `after`.
-
-    The ratio (UFL) is after/before if the fraction decreases, and 1 if it increases.
-    """
+    """Return after/before (UFL) of a decreasing solidified fraction, the part that remains; else 1."""
     return ufl.conditional(ufl.lt(after, before), after / ufl.max_value(before, 1e-12), 1.0)

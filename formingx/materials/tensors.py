@@ -13,41 +13,19 @@ def isochoric(F: Any) -> Entries:
 
     .. math:: \bar C = J^{-2/3} F^T F
 
-    Args:
-        F: deformation gradient (UFL, shape (3, 3)).
-
-    Returns:
-        Entries (11, 22, 12, 33) of the tensor.
+    F (UFL) has shape (3, 3); the result has the entries (11, 22, 12, 33).
     """
     C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
     return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
 
 
 def entries(vector: Any) -> Entries:
-    """Return the entries of a tensor that is stored as a vector.
-
-    Args:
-        vector: entries 11, 22, 12, 33, shape (4,).
-
-    Returns:
-        The entries as a tuple.
-    """
+    """Return the entries of a tensor stored as a vector 11, 22, 12, 33, shape (4,), as a tuple."""
     return vector[0], vector[1], vector[2], vector[3]
 
 
 def plus(A: Entries, B: Entries, factor: Any) -> Entries:
-    r"""Return the sum of a tensor and a multiple of another tensor.
-
-    .. math:: A + c \, B
-
-    Args:
-        A: entries (11, 22, 12, 33) of the first tensor.
-        B: entries (11, 22, 12, 33) of the second tensor.
-        factor: factor c of the second tensor.
-
-    Returns:
-        Entries (11, 22, 12, 33) of the sum.
-    """
+    """Return A + c B with the factor c, entries (11, 22, 12, 33) each."""
     return tuple(a + factor * b for a, b in zip(A, B))              # type: ignore[return-value]
 
 
@@ -56,12 +34,7 @@ def inner(A: Entries, B: Entries) -> Any:
 
     .. math:: A : B = \mathrm{tr}(A B) = A_{11} B_{11} + A_{22} B_{22} + 2 A_{12} B_{12} + A_{33} B_{33}
 
-    Args:
-        A: entries (11, 22, 12, 33) of the first tensor.
-        B: entries (11, 22, 12, 33) of the second tensor.
-
-    Returns:
-        The inner product.
+    Both have the entries (11, 22, 12, 33).
     """
     return A[0] * B[0] + A[1] * B[1] + 2 * A[2] * B[2] + A[3] * B[3]
 
@@ -71,11 +44,7 @@ def determinant(A: Entries) -> Any:
 
     .. math:: \det A = A_{33} (A_{11} A_{22} - A_{12}^2)
 
-    Args:
-        A: entries (11, 22, 12, 33) of the tensor.
-
-    Returns:
-        The determinant.
+    The tensor has the entries (11, 22, 12, 33).
     """
     return A[3] * (A[0] * A[1] - A[2] ** 2)
 
@@ -85,11 +54,7 @@ def cofactor(A: Entries) -> Entries:
 
     .. math:: \mathrm{cof} \, A = \det(A) \, A^{-1}
 
-    Args:
-        A: entries (11, 22, 12, 33) of the tensor.
-
-    Returns:
-        Entries (11, 22, 12, 33) of the cofactor.
+    Both have the entries (11, 22, 12, 33).
     """
     return A[1] * A[3], A[0] * A[3], -A[2] * A[3], A[0] * A[1] - A[2] ** 2
 
@@ -99,12 +64,7 @@ def deviator_squared(C: Entries, B: Entries) -> Any:
 
     .. math:: |\mathrm{dev}(F B F^T)|^2 = \mathrm{tr}\,(C B)^2 - \tfrac{1}{3} (\mathrm{tr}\, C B)^2
 
-    Args:
-        C: entries (11, 22, 12, 33) of the right Cauchy-Green tensor.
-        B: entries (11, 22, 12, 33) of a symmetric tensor in the reference configuration.
-
-    Returns:
-        The squared norm.
+    Both have the entries (11, 22, 12, 33).
     """
     t = C[0] * B[0] + C[1] * B[1] + 2 * C[2] * B[2]
     d = (C[0] * C[1] - C[2] ** 2) * (B[0] * B[1] - B[2] ** 2)

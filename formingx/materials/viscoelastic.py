@@ -95,11 +95,7 @@ class Viscoelastic(GeneralisedMaxwell):
 
         A step of first order has G = Cv_n and x' = x.
 
-        Args:
-            past: isochoric right Cauchy-Green tensor C_n at the beginning of the step, entries (11, 22, 12, 33); None
-                for a step of first order.
-            Cv: internal variable Cv_n at the beginning of the step, entries (11, 22, 12, 33).
-            x: length of the step over the relaxation time.
+        C_n is `past`, None for a step of first order, Cv_n is `Cv`, and x is the step over the relaxation time.
         """
         if past is None:
             return Cv, x
@@ -161,9 +157,7 @@ class TransientNetwork(GeneralisedMaxwell):
         The factor s/(1 + s) is multiplied by 2 - s/2 for s from 2 to 4, and is 0 for larger s, because BDF2 would be
         unstable. It is also 0 where the tensor M of the step (`_past_tensor`) would not be positive definite.
 
-        Args:
-            internal: {name: internal variable at the beginning of the step (UFL, shape () or (4,))}.
-            time_step: length of the step (UFL scalar, time).
+        `internal` has {name: internal variable at the beginning of the step (UFL, shape () or (4,))}.
         """
         s, change = time_step * internal["pace"], entries(internal["change"])
         near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow faster make BDF2 unstable
@@ -200,11 +194,7 @@ class TransientNetwork(GeneralisedMaxwell):
         .. math:: M = e^{-x} A_n + (m - e^{-x} + p) C_n^{-1} + p s (C_n^{-1} - C_{n-1}^{-1}), \qquad
                   m = \frac{1 - e^{-x}}{x}, \qquad p = \frac{x - 2 + (x + 2) e^{-x}}{x^2} \, \frac{s}{1 + s}
 
-        Args:
-            past: C_n^-1 and s (C_n^-1 - C_n-1^-1), entries (11, 22, 12, 33), and s/(1 + s), reduced where BDF2 would be
-                unstable. The length of the step over the length of the previous one is s.
-            A: internal variable A_n at the beginning of the step, entries (11, 22, 12, 33).
-            x: length of the step over the relaxation time.
+        `past` is the result of `_past`, A is A_n, and x is the step over the relaxation time.
         """
         before, change, share = past
         decay, p = ufl.exp(-x), share * _parabola_weight(x)
