@@ -86,19 +86,9 @@ class _UserDefined(_Recorded):
 
 
 def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Quantity]) -> dict[str, Quantity]:
-    """Return the output quantities that a user adds to the columns of a run.
+    """Return {column: quantity} that a user adds, from a target or a function of the `Problem` for each.
 
-    Args:
-        problem: the `Problem`.
-        columns: {name of a column: a target, of which the quantity is recorded, or a function of the `Problem` that
-            returns a number}.
-        taken: {name of an existing column: its quantity}.
-
-    Returns:
-        {name of a column: quantity}.
-
-    Raises:
-        InputError: a name exists already or is no word, or a value of `columns` is neither a target nor a function.
+    A name that is `taken` or no word, or another value, is an InputError.
     """
     if not isinstance(columns, Mapping):
         raise InputError(f"record = {columns!r}: must be {{name: measure}}")
@@ -148,13 +138,6 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Quantity]:
     - pole_stress_ratio: Mises stress at the pole over its equilibrium value (`PoleStressRatio`), for relaxing materials
       with a known equilibrium and a body with a boundary "axis".
     - damage_energy (stress length^3): energy dissipated by damage, for materials with a rate-independent history.
-
-    Args:
-        problem: the `Problem`.
-        timed: True to record the process time.
-
-    Returns:
-        {name of a column: quantity}.
     """
     scene, forms, volume = problem.scene, problem.forms, problem.forms.volume
     energy = scene.symmetry_factor * forms.stress * volume

@@ -17,42 +17,22 @@ def positive_direction(contact: Any) -> np.ndarray:
 
     .. math:: -\frac{m}{|m|}
 
-    Args:
-        contact: the `Contact`; m is its motion per unit of travel (`Contact.travel_vector`).
-
-    Returns:
-        Unit vector against the travel, shape (components,); +Z for a fixed tool.
+    The result has shape (components,), and is +Z for a fixed tool. m is the motion per travel
+    (`Contact.travel_vector`).
     """
     up = np.eye(contact.tool.components)[-1]
     return up if contact.direction is None else -contact.travel_vector / np.linalg.norm(contact.travel_vector)
 
 
 def tool_factor(scene: Any, contact: Any) -> int:
-    """Return the ratio of the force on a whole tool to the force on the part of the tool in the model.
-
-    It is 1 if no mirror plane cuts the tool (`MirrorPlanes.factor_of`).
-
-    Args:
-        scene: the `Scene`.
-        contact: the `Contact` of the tool.
-
-    Returns:
-        The ratio, a power of 2.
-    """
+    """Return the force on a whole tool over that on its part in the model, a power of 2."""
     return int(scene.symmetry.factor_of(contact.tool.bounds, positive_direction(contact)))
 
 
 def support_factor(scene: Any, support: Any) -> int:
-    """Return the ratio of the force on a whole driven support to the force on the part of the support in the model.
+    """Return the force on a whole driven support over that on its part in the model.
 
-    It is 1 if no mirror plane cuts the support (`MirrorPlanes.factor_of`).
-
-    Args:
-        scene: the `Scene`.
-        support: the driven support.
-
-    Returns:
-        The ratio, a power of 2.
+    It is a power of 2, and 1 if no mirror plane cuts the support (`MirrorPlanes.factor_of`).
     """
     (constraint,) = scene.kinematics.in_axes(support, support.constraints())
     nodes = scene.first.mesh.nodes_of(constraint.on)

@@ -53,9 +53,7 @@ class Quantity:
 class WholePartQuantity(Quantity):
     """Output quantity of the whole part, if only a half, a quarter or an eighth of it is modelled (`Scene.symmetry`).
 
-    Args:
-        modelled: quantity of the modelled body.
-        factor: number of images of the modelled body that count; the quantity is multiplied by it.
+    The quantity of the modelled body is multiplied by `factor`, the number of its images that count.
     """
 
     def __init__(self, modelled: Quantity, factor: int):
@@ -76,12 +74,7 @@ class Linear(Quantity):
 
     Here c is the residual of its equation for the target value q*.
 
-    Args:
-        problem: the `Problem`.
-        row: coefficients a of the linear form, locally owned entries, shape (n,).
-        offset: value y_0 of the form for x = 0.
-        function: function f, whose values are in the user's units; the default is the identity.
-        inverse: inverse function of f.
+    The row a has locally owned entries, shape (n,). Values of f are in the user's units; default is the identity.
     """
 
     def __init__(self, problem, row, offset=0.0, function=lambda y: y, inverse=lambda v: v):
@@ -107,11 +100,7 @@ class Form(Quantity):
 
     Here c is the residual of its equation for the target value q*.
 
-    Args:
-        problem: the `Problem`.
-        form: integral I, a UFL form of rank 0 in the unknowns, dimensionless.
-        scale: factor s of the integral, in the user's units.
-        offset: constant q_0, in the user's units.
+    I is a dimensionless UFL form of rank 0; s and q_0 are in the user's units.
     """
 
     def __init__(self, problem, form, scale, offset=0.0):
@@ -140,9 +129,6 @@ class Sag(Quantity):
     r"""Largest downward displacement of a node, from the reference configuration of the first mesh of a run, length.
 
     .. math:: \max(0, \max_i(-u_{z,i}))
-
-    Args:
-        problem: the `Problem`.
     """
 
     smooth = False
@@ -161,10 +147,7 @@ class Sag(Quantity):
             self._earlier = (nodes_at - state_transfer.original_positions(nodes_at))[:, -1] / forms.length
 
     def _largest_sag(self, x: Any) -> tuple[float, int]:
-        """Return the largest sag of a node divided by `forms.length`, and the rank that owns the node; collective.
-
-        x: unknowns. The sag is the fall of a node since the start of the run.
-        """
+        """Return the largest sag over `forms.length`, and the rank that owns its node; collective."""
         sag = -(x.array_r[self._dofs] + self._earlier).min(initial=0.0)
         found = self._problem.comm.allgather(float(sag))
         return max(found), int(np.argmax(found))

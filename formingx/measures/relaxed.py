@@ -25,9 +25,6 @@ class PoleStressRatio:
 
     W is `Material.stored_energy` for the present stress, `Material.equilibrium_energy` for the relaxed stress. In the
     equibiaxial state of a pole, sigma is the stress along the sheet minus the stress through its thickness.
-
-    Args:
-        problem: the `Problem`.
     """
 
     def __init__(self, problem: Any):
@@ -46,24 +43,15 @@ class PoleStressRatio:
 
     @staticmethod
     def known(problem: Any) -> bool:
-        """Check whether the ratio is defined: a boundary "axis", and an equilibrium energy of every material.
-
-        Args:
-            problem: the `Problem`.
-
-        Returns:
-            True if the ratio is defined.
-        """
+        """Return True with a boundary "axis" and an equilibrium energy of every material."""
         forms = problem.forms
         return "axis" in forms.mesh.boundaries and all(t.equilibrium_energy(forms.elastic_F) is not None
                                                        for t in forms.terms)
 
     def evaluate(self) -> float:
-        """Return the present Mises stress at the pole over the relaxed one, in the present state; collective.
+        """Return the present Mises stress at the pole over the relaxed one; collective.
 
-        Returns:
-            The ratio. If the relaxed stress is 0, both stresses belong to a small equibiaxial strain that is added.
-            For an undeformed body this is the ratio of the shear moduli before and after relaxation.
+        If the relaxed stress is 0, a small equibiaxial strain is added, so an undeformed body has the ratio of moduli.
         """
         stored, relaxed, modulus = self._integrals()
         if relaxed < ROUND_OFF * modulus:
@@ -106,11 +94,7 @@ class ElasticStretches:
     """Largest principal elastic stretch of each relaxing branch, at n points of every cell.
 
     It is 1 for a relaxed branch. The values at quadrature points are projected to a linear function in each cell, by
-    least squares.
-
-    Args:
-        problem: the `Problem`.
-        places: positions of the points in the reference cell, shape (n, 2).
+    least squares. The points have positions in the reference cell, shape (n, 2).
 
     Attributes:
         count: largest number of branches of a material; 0 if no material relaxes.
@@ -135,14 +119,9 @@ class ElasticStretches:
             self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
     def evaluate(self, cells: int) -> np.ndarray:
-        """Return the elastic stretches for the present fields of the problem.
+        """Return the stretches in the present fields, (cells, n, branches); nan for a missing branch.
 
-        Args:
-            cells: number of locally owned cells.
-
-        Returns:
-            Stretches at the n points of each cell, shape (cells, n, branches), with the largest number of branches of a
-            material (`count`). They are nan for branches that the material of a cell does not have.
+        Cells are owned ones, and branches the largest number (`count`).
         """
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:

@@ -18,12 +18,8 @@ class Amplitude(Quantity):
     """Output quantity that is a pressure, a travel, the process time or the control itself.
 
     Between two stages the control goes from 0 to 1 and activates or deactivates loads. The quantity of such a load is
-    then the load times the control, or times 1 - control.
-
-    Args:
-        problem: the `Problem`.
-        number: number in `Scene.items` of the item with this pressure or travel; -1 for the process time, None for the
-            control.
+    then the load times the control, or times 1 - control. The item has a number in `Scene.items`, -1 for the process
+    time, None for the control.
     """
 
     def __init__(self, problem: Any, number: int | None):
@@ -55,28 +51,13 @@ class Amplitude(Quantity):
         return (setting.acting_amplitude if self._acts else setting.amplitude)(self._number, control)
 
     def value(self, x, control):
-        """Return this pressure, travel, time or control at a value of the control.
-
-        Args:
-            x: not used.
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            The pressure, travel, time or control, in the user's units.
-        """
+        """Return this pressure, travel, time or control at a control, in the user's units; x is not used."""
         return self._scale * self._amplitude(control)
 
     def equation(self, target):
-        """Return the equation that this pressure, travel, time or control equals a target value.
+        """Return the equation, linear in the control, that this quantity equals a target in the user's units.
 
-        The equation is linear in the control.
-
-        Args:
-            target: the target value, in the user's units.
-
-        Returns:
-            Function of the unknowns x, the control and a PETSc vector, which it sets to dc/dx = 0. It returns the
-            dimensionless residual c and its derivative by the control.
+        It sets a PETSc vector to dc/dx = 0, and returns the dimensionless residual c and its derivative by the control.
         """
         setting = self._problem.setting
         slope = 1.0 if self._number is None else setting.rate[self._number]
@@ -160,27 +141,15 @@ def process_time(value: float) -> Target:
 
 
 def change_completed() -> Target:
-    """Return the target at which the transition between two stages ends.
-
-    There is a transition if the second stage activates or deactivates a load, a support or a tool. The change leaves
-    forces out of balance, which decrease to 0 while the control goes from 0 to 1. The target is the control 1.
-
-    Returns:
-        The target.
-    """
+    """Return the target (control 1) that ends the transition between two stages."""
     return Target("change", 1.0, lambda problem: Amplitude(problem, None))
 
 
 def _driven(quantity: str, value: float, of: str | None) -> Target:
-    """Return the target that a controlled pressure or travel reaches a value.
+    """Return the target that a controlled "pressure" or "travel" reaches a value, stress or length.
 
-    Args:
-        quantity: "pressure" or "travel".
-        value: the target value, stress or length.
-        of: name of the load, support or tool; None for the only one that the run or the stage controls.
-
-    Returns:
-        The target. Its `bind` raises an InputError if the scene has no such item, or several of them.
+    `of` names the load, support or tool; None is the only one. Binding raises an InputError if there is none, or
+    several.
     """
     def bind(problem):
         scene, rate = problem.scene, problem.setting.rate
@@ -308,16 +277,7 @@ def sag(value: float) -> Target:
 
 
 def bind_pole_height(problem: Any) -> Quantity:
-    """Return the axial displacement u_z of the pole of a problem as an output quantity.
-
-    The pole is the material point on the axis at mid-thickness in the reference configuration.
-
-    Args:
-        problem: the `Problem`.
-
-    Returns:
-        The quantity, length.
-    """
+    """Return u_z, length, of the material point on the axis at mid-thickness as an output quantity."""
     low, high = _pole(problem)
     return _displacement(problem, [(0.0, (low + high) / 2)], [[0.0, 1.0]])
 
@@ -329,12 +289,6 @@ def bind_pole_stretch(problem: Any) -> Quantity:
 
     Here h is the current thickness on the axis, h_0 the thickness on the first mesh of the run. In a membrane the
     stretch is 1 + du_r/dR.
-
-    Args:
-        problem: the `Problem`.
-
-    Returns:
-        The quantity, dimensionless.
     """
     low, high = _pole(problem)
     pole = probe(problem, [(0.0, low), (0.0, high)])
@@ -344,18 +298,7 @@ def bind_pole_stretch(problem: Any) -> Quantity:
 
 
 def bind_volume(problem: Any, form: Any = None) -> Quantity:
-    """Return the volume swept by the face under the controlled pressure as an output quantity.
-
-    The volume lies between the reference and the deformed face. It belongs to the whole part, also where a half or a
-    quarter is modelled.
-
-    Args:
-        problem: the `Problem`.
-        form: UFL form of the volume swept in the model (`swept_volume`), if the caller has it; None to build it.
-
-    Returns:
-        The quantity, length^3; in plane strain per unit depth, length^2.
-    """
+    """Return the volume swept by the face under the controlled pressure, length^3, of the whole part."""
     return WholePartQuantity(_volume(problem, form), problem.scene.symmetry_factor)
 
 
@@ -387,14 +330,7 @@ def swept_volume(problem: Any) -> Any:
     a(t u) is the area vector of the face at the displacement t u. For an axisymmetric body it is of degree 2 in t, so
     the two-point Gauss rule in t is exact.
 
-    Args:
-        problem: the `Problem`.
-
-    Returns:
-        The form (UFL, rank 0), dimensionless.
-
-    Raises:
-        InputError: the scene has no controlled pressure with a face.
+    A scene without a controlled pressure with a face is an InputError.
     """
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
     if driven is None or driven.on is None:
@@ -408,26 +344,16 @@ def swept_volume(problem: Any) -> Any:
 
 
 def _displacement(problem, points, factors):
-    """Return a weighted sum of displacement components of material points as an output quantity.
-
-    Args:
-        problem: the `Problem`.
-        points: reference positions of the points, shape (n, 2), length.
-        factors: weights of the displacement components of the points, shape (n, components).
-
-    Returns:
-        The quantity, length.
-    """
+    """Return a sum of displacements of reference points (n, 2) with factors (n, components), length."""
     found = probe(problem, points)
     return Linear(problem, found.row(np.asarray(factors)) * problem.forms.length,
                    float(np.sum(factors * found.earlier_displacement)))
 
 
 def _pole(problem):
-    """Return the axial coordinates Z of the lowest and of the highest node on the axis, on the first mesh, length.
+    """Return the lowest and the highest Z on the axis, on the first mesh, length.
 
-    Raises:
-        InputError: the mesh has no boundary named "axis".
+    A mesh without a boundary "axis" is an InputError.
     """
     mesh = problem.scene.first.mesh
     if "axis" not in mesh.boundaries:
@@ -442,12 +368,6 @@ def is_met(target: Target, size: float, value: float) -> bool:
 
     .. math:: |v - v^*| \le 10^{-12} \max(|v|, |v^*|, size)
 
-    Args:
-        target: the target.
-        size: scale of the quantity, in the user's units (`Quantity.size`).
-        value: value of the quantity, in the user's units.
-
-    Returns:
-        True if the value equals the target.
+    `size` is the scale of the quantity, in the user's units (`Quantity.size`).
     """
     return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)
