@@ -21,16 +21,10 @@ from .tested import MeasuredRange, nearest_test, principal_strains
 
 @register("scene")
 def expected_stretches_beyond_tests(body: Any) -> Iterator[Finding]:
-    """Find constants that tests of a single mode leave undetermined, and expected stretches beyond the tests.
+    """Yield warnings for layers with constants that tests leave undetermined, and stretches beyond the tests.
 
-    For each target of the run, the expected stretch is the largest one of a free dome. In a closed mould it is the
-    square root of the areal draw ratio.
-
-    Args:
-        body: the examined `formingx.checks.sizes.SizedBody`, before its run.
-
-    Yields:
-        A warning for each layer with such constants, and for each expected stretch beyond its tests.
+    An expected stretch is the largest one of a free dome for a target, or the square root of the areal draw ratio of a
+    closed mould.
     """
     for layer, tested in _tested(body.scene):
         about = f"materials[{layer!r}]"
@@ -47,14 +41,7 @@ def expected_stretches_beyond_tests(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def strains_beyond_tests(path: Any) -> Iterator[Finding]:
-    """Find layers with a deformation in the last state that the tests of their material do not cover; collective.
-
-    Args:
-        path: the computed `Path`.
-
-    Yields:
-        A warning for each layer of which 0.5 % of the volume or more is deformed beyond the tests.
-    """
+    """Yield a warning for each layer with 0.5 % of its volume beyond the tests in the last state; collective."""
     problem, scene = path.problem, path.problem.scene
     known = dict(_tested(scene))
     for terms in problem.forms.terms if known else ():
@@ -80,13 +67,7 @@ def strains_beyond_tests(path: Any) -> Iterator[Finding]:
 
 
 def _tests_of(tested: MeasuredRange, largest: float, middle: float) -> str:
-    """Return a text that names the test nearest to a deformation, with its range of stretches.
-
-    Args:
-        tested: tests of the material.
-        largest: largest logarithmic strain of the deformation.
-        middle: middle logarithmic strain.
-    """
+    """Return a text that names the test nearest to logarithmic strains, with its range of stretches."""
     mode = nearest_test(largest, middle)
     found = tested.ranges.get(mode.replace(" ", "_"))
     if found is not None:
@@ -101,15 +82,9 @@ def _tested(scene: Any) -> list[tuple[str, MeasuredRange]]:
 
 
 def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the strains at all n quadrature points of layers with one material, gathered from all ranks; collective.
+    """Return strains (n, 2), positions (n, 2 or 3), volumes (n,) at all points of a material; collective.
 
-    Args:
-        problem: the `Problem`, in the examined state.
-        terms: terms of the forms that belong to these layers.
-
-    Returns:
-        Largest and middle logarithmic strain, shape (n, 2); reference positions, shape (n, 2) or (n, 3), length;
-        reference volumes of the points (quadrature weights), shape (n,), length^3.
+    The columns of strains are the largest and middle logarithmic strain; points of all ranks, length and length^3.
     """
     forms, cells = problem.forms, terms.own_cells
     F = isochoric_gradients(forms, cells, terms.places)

@@ -214,8 +214,7 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
 def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest]:
     """Return the tests of the files among the data; empty if the data are no files.
 
-    Raises:
-        InputError: `test` or `specimen` without files.
+    A `test` or `specimen` without files is an InputError.
     """
     names = [data] if isinstance(data, str | os.PathLike) else data
     if not (isinstance(names, list | tuple) and names and all(isinstance(name, str | os.PathLike) for name in names)):
@@ -226,15 +225,9 @@ def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest]:
 
 
 def _temperatures(data: Any, files: list[MeasuredTest], given: Any) -> list[float] | None:
-    """Return the temperature of each test, or None if it is not known.
+    """Return the temperature of each test from the arguments of `fit`, or None if it is not known.
 
-    Args:
-        data: argument `data` of `fit`.
-        files: tests of the files among the data.
-        given: argument `temperature` of `fit`.
-
-    Raises:
-        InputError: another number of temperatures than tests or files, or temperatures in the files, too.
+    Another number of temperatures than tests, or ones in the files too, are an InputError.
     """
     columns = [entry.temperature for entry in files]
     if given is None:
@@ -276,8 +269,7 @@ def _fit_by_temperature(material: Any, files: list[MeasuredTest], temperatures: 
                         relative: bool, weights: Any, within: Any, conversions: tuple[str, ...]) -> Fit:
     """Fit an elastic material at each temperature; its constants become tables over the temperature.
 
-    Raises:
-        InputError: a constant cannot depend on the temperature, such as an exponent.
+    A constant that cannot depend on it, such as an exponent, is an InputError.
     """
     each: dict[float, Fit] = {}
     for T in sorted(set(temperatures)):
@@ -317,17 +309,7 @@ def _fit_by_temperature(material: Any, files: list[MeasuredTest], temperatures: 
 
 def _fit_timed(fitted: Callable, material: Any, tests: Any, terms: int | None, relative: bool, weights: Any,
              within: Any) -> Fit:
-    """Fit a relaxing material to tests in time, and return the result.
-
-    Args:
-        fitted: function that fits the constants of materials of this class.
-        material: class, or material with initial constants.
-        tests: list of `TimedTest`.
-        terms: number of branches; None: as many as the tests determine.
-        relative: True for misfits over the measured stress, False for misfits in stress.
-        weights: weight of each test, or None.
-        within: lowest and highest stretch of the points that count, or None.
-    """
+    """Fit a relaxing material to tests in time by the function `fitted`, and return the result."""
     number = len(tests) if isinstance(tests, list | tuple) else 0
     relaxing, constants, used, found = fitted(material, tests, terms, relative, numbered_weights(weights, number),
                                               within)
@@ -335,14 +317,7 @@ def _fit_timed(fitted: Callable, material: Any, tests: Any, terms: int | None, r
 
 
 def _timed_result(relaxing: Any, constants: dict[str, float], used: list[TimedTest], found: Uncertainty) -> Fit:
-    """Return the `Fit` of a relaxing material.
-
-    Args:
-        relaxing: material with the fitted constants.
-        constants: {constant: value}.
-        used: the checked tests.
-        found: uncertainty of the constants.
-    """
+    """Return the `Fit` of a relaxing material with its {constant: value}, checked tests and uncertainty."""
     misfits, measured, parts, n = [], [], {}, 0
     stretches: dict[str, list] = {}
     rates = []
@@ -367,15 +342,7 @@ def _result(material: Any, constants: dict[str, float], parts: dict[str, slice],
             measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any) -> Fit:
     """Return the `Fit` with a copy of a fitted material that stores the range of its tests, and with its misfits.
 
-    Args:
-        material: material with the fitted constants.
-        constants: {constant: value} of the fitted constants.
-        parts: {test: slice of its points in `misfit` and `measured`}.
-        misfit: computed minus measured stress at all m points, shape (m,).
-        measured: measured stress at all points, shape (m,).
-        found: uncertainty of the constants.
-        tested: range of the tests.
-        data: the tests, as they were given to `fit`.
+    `misfit` is computed minus measured stress at m points, both (m,); `parts` has the slice of each test.
     """
     fitted_material = copy.copy(material)
     fitted_material.tested = tested
@@ -399,13 +366,7 @@ def _shares(found: Uncertainty, parts: dict[str, slice]) -> dict[str, dict[str, 
 def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Material, Uncertainty]:
     """Fit a material to elastic tests, which state no times; return it with the uncertainty of its constants.
 
-    Args:
-        material: class, or material with initial constants.
-        points: measured stresses of all tests.
-        terms: number of terms of the class `Ogden`, or None.
-
-    Raises:
-        InputError: fewer points than constants, or no finite stress at some stretch of the tests.
+    `terms` are those of the class `Ogden`. Fewer points than constants, or no finite stress, are an InputError.
     """
     from scipy.optimize import least_squares
     guesses = _guesses(material, points, terms)
@@ -416,12 +377,8 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
     def refined(guess: Material, start: Any, evaluations: int | None) -> tuple[float, Material, np.ndarray]:
         """Return (cost, guess, fitted coordinates of the constants) after a least-squares fit.
 
-        The cost is infinite if the stress of the guess is not finite at some stretch.
-
-        Args:
-            guess: material whose class and coordinates are fitted.
-            start: coordinates of the constants from which the fit starts, shape (constants,).
-            evaluations: largest number of evaluations of the stresses; None: 100 for each constant.
+        It starts at coordinates (constants,), with at most `evaluations` (None: 100 for each). A stress that is not
+        finite costs infinity.
         """
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 
@@ -452,8 +409,7 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
 def _elastic(files: list[MeasuredTest]) -> dict[str, tuple[np.ndarray, ...]]:
     """Return {test: (stretches, stresses)} of tests from files without times.
 
-    Raises:
-        InputError: a file has a column with the time.
+    A file with times is an InputError.
     """
     found: dict[str, list] = {}
     for entry in files:
@@ -467,8 +423,7 @@ def _elastic(files: list[MeasuredTest]) -> dict[str, tuple[np.ndarray, ...]]:
 def _in_time(files: list[MeasuredTest]) -> list[TimedTest]:
     """Return the tests in time from files.
 
-    Raises:
-        InputError: a file has no column with the time.
+    A file without times is an InputError.
     """
     for entry in files:
         if entry.times is None:
@@ -480,13 +435,7 @@ def _in_time(files: list[MeasuredTest]) -> list[TimedTest]:
 def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]:
     """Return materials with the constants from which a fit starts.
 
-    Args:
-        material: class, or material with initial constants.
-        points: measured stresses of all tests.
-        terms: number of terms of the class `Ogden`, or None.
-
-    Raises:
-        InputError: no material, terms that it does not have, or stresses whose sign differs from the strains.
+    No material, wrong terms, or stresses whose sign differs from the strains are an InputError.
     """
     if isinstance(material, Material):
         if terms is not None:

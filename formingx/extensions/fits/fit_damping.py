@@ -86,20 +86,8 @@ def fit_damping(material: Any, tests: Any, terms: int | None, relative: bool, we
                    ) -> tuple[KBKZ, dict[str, float], list[TimedTest], Uncertainty]:
     """Fit the damping function of a melt to tests in time; its spectrum does not change.
 
-    Args:
-        material: a `KBKZ` with the initial damping.
-        tests: list of `TimedTest`.
-        terms: must be None.
-        relative: True for misfits over the measured stress, False for misfits in stress.
-        weights: weight of each test.
-        within: lowest and highest stretch of the points that count, or None.
-
-    Returns:
-        Material with the fitted damping; {constant of the damping: value}; the tests as arrays; uncertainty of the
-        constants.
-
-    Raises:
-        InputError: a material without a damping to fit, `terms`, fewer points than constants, or wrong tests.
+    The results are the material, {constant: value}, the tests as arrays and the uncertainty. A material without a
+    damping, `terms`, fewer points than constants or wrong tests are an InputError.
     """
     from scipy.optimize import least_squares
     if not isinstance(material, KBKZ) or material.damping is None or not material.damping.bounds:

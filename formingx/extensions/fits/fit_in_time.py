@@ -95,20 +95,8 @@ def fit_timed_tests(material: type[GeneralisedMaxwell] | GeneralisedMaxwell, tes
                    ) -> tuple[GeneralisedMaxwell, dict[str, float], list[TimedTest], Uncertainty]:
     """Fit the constants of a relaxing material to tests in time.
 
-    Args:
-        material: class, or material with initial constants.
-        tests: list of `TimedTest`.
-        terms: number of branches for a class; None for as many as the tests determine, at most 10.
-        relative: True for misfits over the measured stress, False for misfits in stress.
-        weights: weight of each test.
-        within: lowest and highest stretch of the points that count, or None.
-
-    Returns:
-        Material with the fitted constants; {constant: value}; the tests as arrays; uncertainty of the constants.
-
-    Raises:
-        InputError: wrong tests, fewer points than constants, no finite stress at some stretch, or `terms` for a
-            material that has branches already.
+    The results are the material, {constant: value}, the tests as arrays and the uncertainty. `terms` are branches, None
+    for at most 10. Wrong tests, fewer points than constants or no finite stress are an InputError.
     """
     law = material if isinstance(material, type) else type(material)
     data = _TimedData(checked_tests(tests, within), law, relative, weights)
@@ -130,17 +118,10 @@ def fit_timed_tests(material: type[GeneralisedMaxwell] | GeneralisedMaxwell, tes
 
 
 def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
-    """Return tests in time as arrays, checked, with nan for stresses at stretches outside a range.
+    """Return tests in time as arrays, with nan for stresses at stretches outside the range `within`.
 
-    Args:
-        tests: list of `TimedTest`.
-        within: lowest and highest stretch of the points that count, or None for all.
-
-    Returns:
-        The tests. A constant stretch with a positive first time gets a point at time 0.
-
-    Raises:
-        InputError: an argument that is no list of tests, a test with inconsistent arrays, or no stress other than 0.
+    A constant stretch with a positive first time gets a point at time 0. Inconsistent tests, or none with a stress, are
+    an InputError.
     """
     found = []
     for i, test in enumerate(as_list("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
@@ -163,11 +144,7 @@ def _initial_material(kind: type[GeneralisedMaxwell]) -> GeneralisedMaxwell:
 class _TimedData:
     """Measured stresses of all tests as one vector, and the stresses of a relaxing material at the same n points.
 
-    Args:
-        tests: the checked tests.
-        law: class of the relaxing material.
-        relative: True for misfits over the measured stress, False for misfits in stress.
-        weights: weight of each test.
+    Tests whose times are all the same are an InputError.
 
     Attributes:
         tests: the checked tests.
@@ -178,9 +155,6 @@ class _TimedData:
         branch: spline that returns the stresses of branches of unit modulus, shape (n, j), for the logarithms of their
             relaxation times, shape (j,).
         largest_I1: largest first invariant of C at the points.
-
-    Raises:
-        InputError: the times of each test are all the same.
     """
 
     def __init__(self, tests: list[TimedTest], law: type[GeneralisedMaxwell], relative: bool, weights: list[float]):
@@ -205,13 +179,7 @@ class _TimedData:
         self.branch: Callable = CubicSpline(self.log_tau, np.concatenate(unit), axis=1)
 
     def equilibrium_stress(self, material: Material | None, constants: Any = None) -> np.ndarray:
-        """Return the nominal stresses of the equilibrium material at all points, shape (n,).
-
-        They are infinite or nan at stretches beyond the limit of the material (Gent, Arruda-Boyce).
-
-        Args:
-            material: equilibrium of a relaxing material, or None for no stress.
-            constants: other values of its constants, unchecked, or None for its own.
+        """Return the nominal stresses of the equilibrium (None: 0) at all points, (n,); inf or nan beyond its limit.
         """
         if material is None:
             return np.zeros(len(self.stress))
@@ -219,12 +187,7 @@ class _TimedData:
         return material.response.stress(self._stretches, values)[0]
 
     def stresses(self, material: GeneralisedMaxwell, constants: np.ndarray) -> np.ndarray:
-        """Return the nominal stresses of a relaxing material with other constants at all points, shape (n,).
-
-        Args:
-            material: the relaxing material, with b branches.
-            constants: constants of the equilibrium, then b pairs of modulus and relaxation time; unchecked.
-        """
+        """Return stresses (n,) of a material with b branches, for constants of equilibrium and b pairs, unchecked."""
         n = len(constants) - 2 * len(material.branches)
         mu, tau = constants[n::2], constants[n + 1::2]
         log_tau = np.clip(np.log(tau), self.log_tau[0], self.log_tau[-1])
@@ -240,12 +203,6 @@ class ShiftedTests:
 
     A branch with the relaxation time tau at the reference temperature has the time aT tau in a test with the shift aT.
     The stresses of branches are computed once, over a wide range of times.
-
-    Args:
-        tests: the checked tests.
-        material: class, or material whose equilibrium is scaled in the first search.
-        relative: True for misfits over the measured stress, False for misfits in stress.
-        weights: weight of each test.
 
     Attributes:
         stress: measured nominal stresses, shape (n,).
@@ -275,9 +232,7 @@ class ShiftedTests:
     def branches(self, tau: np.ndarray, factors: np.ndarray) -> np.ndarray:
         """Return the stresses of j branches of unit modulus at all measured points, shape (n, j).
 
-        Args:
-            tau: relaxation times at the reference temperature, shape (j,).
-            factors: shift of each test.
+        tau has shape (j,) at the reference temperature; `factors` are the shifts of tests.
         """
         found = []
         for spline, a in zip(self._splines, factors):
@@ -289,8 +244,7 @@ class ShiftedTests:
     def spectrum_misfit(self, factors: np.ndarray) -> float:
         """Return the squared misfit of the best spectrum with two times per decade and nonnegative moduli.
 
-        Args:
-            factors: shift of each test.
+        `factors` are the shifts of the tests.
         """
         from scipy.optimize import nnls
         low = min(spline.x[0] - np.log(a) for spline, a in zip(self._splines, factors))
@@ -303,12 +257,9 @@ class ShiftedTests:
         return float(nnls(columns / self.sizes[:, None], self.stress / self.sizes)[1] ** 2)
 
     def stresses(self, material: GeneralisedMaxwell, constants: Any, factors: np.ndarray) -> np.ndarray:
-        """Return the nominal stresses at all measured points, shape (n,).
+        """Return the nominal stresses of a material at all measured points, shape (n,), with shifts of tests.
 
-        Args:
-            material: the material.
-            constants: its constants at the reference temperature, in the order of `parameters`.
-            factors: shift of each test.
+        The constants, at the reference temperature, have the order of `parameters`.
         """
         values, n = np.asarray(constants, float), len(material.parameters) - 2 * len(material.branches)
         rest = 0.0
@@ -318,19 +269,10 @@ class ShiftedTests:
 
 
 def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tuple[GeneralisedMaxwell, float]:
-    """Fit the constants of a relaxing material with n branches to the tests.
+    """Return a material of n fitted branches, ascending in time, and the root mean square of relative misfits.
 
-    Args:
-        data: the tests.
-        material: relaxing material whose constants are one of the initial guesses if it has n branches.
-        n: number of branches.
-
-    Returns:
-        The fitted material, with its branches in ascending order of relaxation time; root mean square of the misfits,
-        each divided by its size (`data.sizes`).
-
-    Raises:
-        InputError: fewer points than constants, or no finite stress at some stretch of the tests.
+    A given material of n branches is one of the guesses. Fewer points than constants, or no finite stress, are an
+    InputError.
     """
     from scipy.optimize import least_squares
     if len(data.stress) < (needed := len(material.parameters) - 2 * len(material.branches) + 2 * n):
@@ -366,14 +308,8 @@ def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tup
 def _guesses(data: _TimedData, material: GeneralisedMaxwell, n: int) -> list[GeneralisedMaxwell]:
     """Return materials with n branches from which a fit starts.
 
-    A spectrum of many relaxation times is fitted first. In the first guess each of the n times stands for an equal
-    share of its moduli. In the second the logarithms of the times are equally spaced over its range. The given material
-    is the third if it has n branches.
-
-    Args:
-        data: measured stresses of the tests, and stresses of single branches at the same points.
-        material: material whose class and equilibrium part are used.
-        n: number of branches.
+    A spectrum of many times is fitted first. Times stand for equal shares of its moduli, then lie at equal ratios; the
+    given material is third if it has n branches.
     """
     from scipy.optimize import nnls
     equilibrium = material.equilibrium
@@ -394,15 +330,9 @@ def _guesses(data: _TimedData, material: GeneralisedMaxwell, n: int) -> list[Gen
 
 
 def _scaled(material: Material | None, factor: float, I1: float) -> Material | None:
-    """Return a first guess of an equilibrium material, whose shear modulus is a multiple of a given material's.
+    """Return a first guess of an equilibrium with `factor` times the modulus, with finite stress up to I1.
 
-    Args:
-        material: the given material, or None.
-        factor: shear modulus of the guess over the shear modulus of the given material.
-        I1: largest first invariant of C in the tests. The stress of the guess is finite there.
-
-    Returns:
-        First guess of the same class, or the material itself if its class has no first guesses; None for None.
+    A class without first guesses keeps the material; None stays None.
     """
     if material is None:
         return None
@@ -413,14 +343,9 @@ def _scaled(material: Material | None, factor: float, I1: float) -> Material | N
 
 
 def _checked(name: str, test: TimedTest) -> dict[str, Any]:
-    """Return times, stretches and stresses of a test as arrays: {argument of `TimedTest`: array}.
+    """Return {argument of `TimedTest`: array} of a test, checked.
 
-    Args:
-        name: name of the test, for messages.
-        test: the test.
-
-    Raises:
-        InputError: wrong or inconsistent arrays, or a first stretch other than 1 whose time of application is unknown.
+    Inconsistent arrays, or a first stretch other than 1 at an unknown time, are an InputError.
     """
     t, l = branches.checked(name, test.mode, test.times, test.stretches, test.between)
     try:

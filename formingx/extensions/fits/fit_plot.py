@@ -11,18 +11,8 @@ from ...figures import figure
 def draw_fit(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
     """Draw measured and fitted nominal stresses over the stretch, for relaxation tests over the time.
 
-    Args:
-        material: the fitted material.
-        data: the tests, {test: columns} or a list of `TimedTest`.
-        axes: matplotlib axes, a pair if only some of the tests are relaxation tests; None for a new figure.
-        unit: unit of stress, for the label.
-        unit_of_time: unit of time, for the label.
-
-    Returns:
-        The matplotlib axes.
-
-    Raises:
-        InputError: one matplotlib axes for relaxation tests and other tests together.
+    It returns the axes, a pair for both kinds of tests; single ones for both are an InputError. Data are {test:
+    columns} or a list of `TimedTest`.
     """
     constant = [] if isinstance(data, dict) else [np.ptp(test.stretches) == 0 for test in data]
     count = 1 + (any(constant) and not all(constant))
@@ -45,12 +35,9 @@ def draw_fit(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) 
 
 
 def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
-    """Draw stresses of elastic tests over the stretch, with curves of the material.
+    """Draw {test: (stretches, stresses)}, (n,) each, with curves of the material on axes.
 
-    Args:
-        material: the fitted material.
-        data: {test: (stretches, nominal stresses)}, shape (n,) each; of "biaxial" two stretches and two stresses.
-        panel: matplotlib axes.
+    "biaxial" has two stretches and two stresses.
     """
     for mode, (l, *others, P) in data.items():
         if others:                                          # two stretches, two stresses
@@ -64,10 +51,7 @@ def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
 def _draw_biaxial(material: Any, columns: Any, panel: Any) -> None:
     """Draw stresses of a biaxial test over its first stretch, and the stresses of the material as crosses.
 
-    Args:
-        material: the fitted material.
-        columns: (stretches 1, stretches 2, nominal stresses 1, nominal stresses 2), shape (n,) each.
-        panel: matplotlib axes.
+    Columns are two stretches and two nominal stresses, (n,) each.
     """
     l1, l2, *stresses = (np.asarray(x, float) for x in columns)
     computed = material.stress("biaxial", np.stack([l1, l2]))
@@ -79,11 +63,8 @@ def _draw_biaxial(material: Any, columns: Any, panel: Any) -> None:
 def _draw_timed(material: Any, tests: Any, constant: list[bool], panels: Any) -> None:
     """Draw stresses of tests in time, with curves of the material.
 
-    Args:
-        material: the fitted material.
-        tests: the tests in time.
-        constant: True for each test at constant stretch: it is drawn over the logarithmic time, else over the stretch.
-        panels: matplotlib axes; tests at constant stretch are drawn on the first, the others on the last.
+    Tests at `constant` stretch go over the logarithmic time on the first of the panels, the others over stretch on the
+    last.
     """
     for i, (test, is_relaxation) in enumerate(zip(tests, constant), 1):
         panel = panels[0] if is_relaxation else panels[-1]

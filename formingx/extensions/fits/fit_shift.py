@@ -72,21 +72,8 @@ def fit_shift(fitted: Callable, material: Any, tests: list[TimedTest], temperatu
               ) -> ShiftedFit:
     """Fit the constants of a relaxing material and their shift with the temperature.
 
-    Args:
-        fitted: function that fits the constants at one temperature (`fit_in_time.fit_timed_tests`).
-        material: class, or material with initial constants.
-        tests: list of `TimedTest`.
-        temperatures: temperature of each test, shape (n,).
-        kind: "WLF", "Arrhenius" or "table".
-        reference: reference temperature.
-        unit: unit of the temperatures, "C" or "K".
-        terms: number of branches, or None.
-        relative: True for misfits over the measured stress.
-        weights: weight of each test.
-        within: lowest and highest stretch of the points that count, or None.
-
-    Raises:
-        InputError: the shift is unknown, or there are too few temperatures for it.
+    `fitted` fits at one temperature; tests have temperatures (n,) in "C" or "K"; the kind is "WLF", "Arrhenius" or
+    "table". An unknown shift, or too few temperatures, is an InputError.
     """
     from scipy.optimize import minimize
     check_name("fit: shift", kind, SHIFTS)
@@ -164,8 +151,7 @@ def _result(base: GeneralisedMaxwell, law: _ShiftLaw, unknowns: np.ndarray, data
 def _law(kind: str, temperatures: np.ndarray, reference: float, unit: str) -> _ShiftLaw:
     """Return the shift law of a kind for tests at given temperatures.
 
-    Raises:
-        InputError: too few temperatures.
+    Too few temperatures are an InputError.
     """
     other = sorted({float(T) for T in temperatures if reference != T})
     zero = ABSOLUTE_ZERO[unit]
@@ -206,8 +192,7 @@ def _law(kind: str, temperatures: np.ndarray, reference: float, unit: str) -> _S
 class _LogTable:
     """Shift aT(T) whose logarithm is a smooth curve through given points, constant beyond them.
 
-    Args:
-        points: {temperature: log10 aT}.
+    Points are {temperature: log10 aT}.
     """
 
     def __init__(self, points: dict[float, float]):

@@ -69,23 +69,10 @@ class MeasuredTest(NamedTuple):
 
 
 def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> list[MeasuredTest]:
-    """Read the tests of a CSV file.
+    """Return the tests of a CSV file, by default with columns test, stretch, nominal stress and, in time, time.
 
-    Without a line that names them, the columns are test, stretch, nominal stress and, for tests in time, time. A test
-    ends where its name or its temperature changes, or the time decreases.
-
-    Args:
-        file: path of the CSV file.
-        test: name of the test, for a file without a column of it.
-        specimen: {"length": gauge length, "area": cross-section} of the specimen, in place of the area also "width" and
-            "thickness"; for columns of displacement and force. Lengths have the unit of the displacement, or mm.
-
-    Returns:
-        The tests.
-
-    Raises:
-        InputError: a file that cannot be read or has no rows, a first line without a required column, with an unused
-            column or an unknown unit, or a malformed row.
+    A test ends where its name or temperature changes, or the time decreases. `specimen` has "length" and "area", or
+    "width" and "thickness", for displacement and force. A malformed file is an InputError.
     """
     caller = f"fit: data: {file}"
     try:
@@ -124,10 +111,8 @@ def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> lis
 def _head(caller: str, rows: list[tuple[int, list[str]]]) -> tuple[int, dict[str, int] | None, dict[str, Any]]:
     """Return the line behind the one that names the columns, {quantity or name: column}, and {quantity: unit or None}.
 
-    A title before it is skipped. Without such a line the result is (0, None, {}).
-
-    Raises:
-        InputError: two columns of one quantity, or an unknown unit.
+    A title is skipped; without names it is (0, None, {}). Two columns of one quantity, or an unknown unit, are an
+    InputError.
     """
     for start, (_, row) in enumerate(rows, 1):
         cells = [name_and_unit(cell) for cell in row]
@@ -156,12 +141,9 @@ def _head(caller: str, rows: list[tuple[int, list[str]]]) -> tuple[int, dict[str
 
 def _checked_columns(caller: str, columns: dict[str, int], rows: list[tuple[int, list[str]]], start: int,
                      units: dict[str, Any], test: str | None) -> dict[str, int]:
-    """Return {quantity: column} of the columns that a fit uses, checked.
+    """Return {quantity: column} of the columns that a fit uses, without unused columns of text.
 
-    Columns of text that a fit does not use, such as a name of the specimen, are left out.
-
-    Raises:
-        InputError: a column of numbers that a fit does not use, a missing column, or an unknown unit.
+    An unused column of numbers, a missing column, or an unknown unit is an InputError.
     """
     what = ("must be test, stretch (or strain, displacement), stress (nominal, true, or force), and time if any")
     names = ", ".join(repr(name_and_unit(cell)[0]) for cell in rows[start - 1][1] if not is_number(cell))
@@ -196,8 +178,7 @@ def _plain(words: str) -> str:
 def _point(where: str, row: list[str], width: int, columns: dict[str, int], test: str | None) -> dict[str, Any]:
     """Return a row of the file as {quantity: value}; an empty stress in a test in time is nan.
 
-    Raises:
-        InputError: another number of cells, an unknown test, or a cell that is no number.
+    Another number of cells, an unknown test, or a cell that is no number is an InputError.
     """
     if len(row) != width or len(columns) < 3 - (test is not None):
         raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"
@@ -219,8 +200,7 @@ def _converted(caller: str, points: list[dict[str, Any]], units: dict[str, Any],
                ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Return points with stretch and nominal stress, and what was done as text.
 
-    Raises:
-        InputError: the size of the specimen is missing, not positive, or not used.
+    A specimen whose size is missing, not positive, or not used is an InputError.
     """
     given = dict(check_type("fit: specimen", {} if specimen is None else specimen, Mapping,
                             "a dict such as {'length': 30.0, 'width': 4.0, 'thickness': 1.0}"))

@@ -14,13 +14,8 @@ from .weights import divisors, in_range, named_weights
 class Points:
     """Measured stresses of elastic tests, which state no times, checked, as one vector of m numbers.
 
-    A biaxial test has two stresses at each of its points, the other tests have one.
-
-    Args:
-        data: {test: (stretches, nominal stresses)}, shape (n,) each; of "biaxial" two stretches and two stresses.
-        relative: True for misfits divided by the measured stress, False for misfits in stress.
-        weights: {test: weight of the squared misfits of its points}; None: weight 1.
-        within: lowest and highest stretch of the points that count, or None.
+    A biaxial test has two stresses at each of its points, the other tests have one. Inconsistent tests, no strain, or
+    no point within the range are an InputError.
 
     Attributes:
         data: the tests as given.
@@ -29,9 +24,6 @@ class Points:
         sizes: stress by which each misfit is divided, shape (m,).
         parts: {test: slice of its stresses in `measured`}.
         largest_I1: largest first invariant of C at the points.
-
-    Raises:
-        InputError: wrong or inconsistent tests, no strain, or no point within the range.
     """
 
     def __init__(self, data: Any, relative: bool, weights: Any, within: Any):
@@ -65,63 +57,30 @@ class Points:
         self.largest_I1 = float((l1**2 + l2**2 + (l1 * l2) ** -2).max())
 
     def stress(self, response: Any, constants: Any) -> np.ndarray:
-        """Return the nominal stresses of a material in the order of `measured`.
-
-        They are infinite or nan at stretches beyond the limit of the material (Gent, Arruda-Boyce).
-
-        Args:
-            response: stress response of the material, `Material.response`.
-            constants: values of the constants of the material.
-
-        Returns:
-            Nominal stresses, shape (m,).
-        """
+        """Return the stresses of a material at its constants, (m,), as `measured`; inf or nan beyond its limit."""
         return self._in_order(response.stress(self._stretches, list(constants)))
 
     def modulus(self) -> float:
-        """Return a first guess of the shear modulus.
-
-        Returns:
-            Median ratio of the measured stresses to the stresses of a neo-Hookean material of unit shear modulus,
-            stress.
-        """
+        """Return the median of measured stresses over those of a neo-Hookean material of unit modulus, stress."""
         l1, l2 = self._stretches
         with np.errstate(divide="ignore"):
             shape = self._in_order(np.stack([l1 - 1 / (l1**3 * l2**2), l2 - 1 / (l2**3 * l1**2)]))
         return float(np.median(self.measured[shape != 0] / shape[shape != 0]))
 
     def _in_order(self, values: np.ndarray) -> np.ndarray:
-        """Return values in the order of `measured`, shape (m,).
-
-        Args:
-            values: values in the first and the second direction at all n points, shape (2, n).
-        """
+        """Return values of both directions at all n points, shape (2, n), in the order of `measured`, (m,)."""
         return np.concatenate([values[:, self._rows == k][self._measured_mask[:, self._rows == k]]
                                for k in range(len(self.parts))])
 
 
 def _within_range(mode: str, l: np.ndarray, P: np.ndarray, within: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Return the stretches and stresses of the k points of a test that lie in a range, shape (2, k) each.
-
-    Args:
-        mode: name of the test; of "biaxial" both stretches must lie in the range.
-        l: stretches, shape (2, n).
-        P: nominal stresses, shape (2, n).
-        within: lowest and highest stretch, or None for all.
-    """
+    """Return the stretches and stresses, (2, n), of points within a range, (2, k) each; biaxial: both in it."""
     inside = in_range(within, l).all(0) if mode == "biaxial" else in_range(within, l[0])
     return l[:, inside], P[:, inside]
 
 
 def hint_if_strains(values: np.ndarray) -> str:
-    """Return a hint for an error message if the given stretches of a test are probably strains.
-
-    Args:
-        values: given stretches, shape (n,), dimensionless.
-
-    Returns:
-        The hint; "" if the values are no strains.
-    """
+    """Return a hint for an error message if the stretches (n,) of a test are probably strains, or ""."""
     if not np.all(np.isfinite(values)) or np.min(values) > 0 and np.max(values) > 1 or np.min(values) <= -1:
         return ""
     return ". Is it strain? The stretch is 1 + strain, of percent 1 + strain/100"
@@ -130,14 +89,7 @@ def hint_if_strains(values: np.ndarray) -> str:
 def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return stretches and nominal stresses of a test in both in-plane directions, shape (2, n) each, checked.
 
-    A stress that was not measured is nan, such as the second stress of a test other than "biaxial".
-
-    Args:
-        mode: "uniaxial", "pure_shear", "equibiaxial" or "biaxial".
-        columns: (stretches, stresses), or for "biaxial" (stretches 1, stretches 2, stresses 1, stresses 2).
-
-    Raises:
-        InputError: an unknown test, wrong shapes, or numbers that are not admissible.
+    A stress that was not measured is nan. An unknown mode, wrong shapes, or inadmissible numbers are an InputError.
     """
     check_name("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
     biaxial = mode == "biaxial"

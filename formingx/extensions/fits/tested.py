@@ -122,10 +122,7 @@ class MeasuredRange:
 
     @cached_property
     def _corners(self) -> np.ndarray:
-        """Corners of the convex hull of the tested strains and zero strain, counter-clockwise, shape (k, 2).
-
-        The columns are the largest and the middle principal logarithmic strain.
-        """
+        """Return the convex hull of tested (largest, middle) logarithmic strains and zero, (k, 2)."""
         return _hull(np.vstack([np.zeros(2), self.strains]))
 
     def __repr__(self) -> str:
@@ -160,28 +157,13 @@ def with_tests(material: Material, **stretches: Any) -> Material:
 
 
 def principal_strains(stretches: Any) -> np.ndarray:
-    """Return the largest and the middle principal logarithmic strain of incompressible deformations.
-
-    Args:
-        stretches: principal stretches in two directions, shape (2, n), in any order.
-
-    Returns:
-        Largest and middle logarithmic strain, shape (n, 2).
-    """
+    """Return the largest and middle logarithmic strain, (n, 2), of incompressible stretches (2, n)."""
     e = np.log(np.asarray(stretches, float))
     return -np.sort(-np.stack([*e, -e[0] - e[1]]), axis=0)[:2].T
 
 
 def nearest_test(largest: float, middle: float) -> str:
-    """Return the name of the test whose mode of deformation is nearest to given strains.
-
-    Args:
-        largest: largest principal logarithmic strain.
-        middle: middle principal logarithmic strain.
-
-    Returns:
-        "uniaxial", "pure shear" or "equibiaxial".
-    """
+    """Return "uniaxial", "pure shear" or "equibiaxial", nearest to two logarithmic strains."""
     share = middle / largest if largest > 0 else 0.0
     return min(MODES, key=lambda mode: abs(MODES[mode] - share)).replace("_", " ")
 

@@ -42,15 +42,7 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
     chapter 5). A standard error is nan if there are no more points than constants. It is infinite if doubling the
     constant changes no stress by more than 1e-6 of its divisor.
 
-    Args:
-        stress: function of the constants, shape (p,), that returns the stresses at all points, shape (n,); not finite
-            beyond the limit of a material.
-        constants: {constant: fitted value}, with p entries.
-        measured: measured stresses, shape (n,).
-        sizes: stress by which each misfit is divided, shape (n,).
-
-    Returns:
-        Standard errors and covariance of the constants.
+    The function `stress` maps constants (p,) to stresses (n,); measured stresses and sizes d have shape (n,).
     """
     values = np.array(list(constants.values()), float)
     first = stress(values)
@@ -75,17 +67,10 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 
 
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
-    """Return the derivative of the stresses, each divided by its size, by one constant, shape (n,).
+    """Return the derivative of the stresses over their sizes, (n,), by constant i of (p,) values.
 
-    It is a difference quotient. The step grows until a stress changes by more than 1e-6 of its size. If it would exceed
-    the constant itself, the derivative is 0.
-
-    Args:
-        stress: function of the constants, shape (p,), that returns stresses, shape (n,).
-        first: stresses for the fitted values, shape (n,).
-        values: fitted values of the constants, shape (p,).
-        i: number of the constant, from 0.
-        sizes: stress by which each misfit is divided, shape (n,).
+    The step grows until a stress changes by more than 1e-6 of its size; if it exceeds the constant, the derivative is
+    0.
     """
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
     largest = abs(values[i]) or math.inf        # a larger step of an exponent without effect would have one

@@ -13,19 +13,10 @@ _MIN_DIVISOR = 0.02
 
 
 def divisors(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.ndarray:
-    """Return the stress by which the misfit of each measured stress is divided.
+    """Return the stress by which the misfit of each measured stress is divided, shape (n,).
 
-    Args:
-        parts: measured stresses of each test, arrays with n numbers in all.
-        relative: True: the measured stress, or 2 % of the largest of its test if that is more. False: the largest
-            stress of all tests.
-        weights: weight of each test; its divisors are divided by the root of the weight.
-
-    Returns:
-        Divisors, test by test, shape (n,), stress.
-
-    Raises:
-        InputError: `relative` is neither True nor False.
+    `relative` takes the stress itself, at least 2 % of its test's largest, otherwise the largest of all; weights divide
+    by their root. Neither True nor False is an InputError.
     """
     relative = check_type("fit: relative", relative, bool, "True or False")
     largest = max((float(np.abs(P).max()) for P in parts if len(P)), default=1.0) or 1.0
@@ -38,17 +29,9 @@ def divisors(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np
 
 
 def named_weights(weights: Any, names: list[str]) -> list[float]:
-    """Return the weights of tests that are given by name, checked.
+    """Return the weight of each test from {test: weight}, in the order of names; the default is 1.
 
-    Args:
-        weights: {test: weight}, or None; tests without a weight have weight 1.
-        names: names of the tests.
-
-    Returns:
-        Weight of each test, in the order of the names.
-
-    Raises:
-        InputError: an unknown test, or a weight that is not positive.
+    An unknown test, or a weight that is not positive, is an InputError.
     """
     if weights is None:
         return [1.0] * len(names)
@@ -61,17 +44,9 @@ def named_weights(weights: Any, names: list[str]) -> list[float]:
 
 
 def numbered_weights(weights: Any, count: int) -> list[float]:
-    """Return the weights of a list of tests in time, checked.
+    """Return the weights of a list of tests in time; None: all 1.
 
-    Args:
-        weights: list with the weight of each test; None: all weights are 1.
-        count: number of tests.
-
-    Returns:
-        Weight of each test.
-
-    Raises:
-        InputError: another number of weights, or a weight that is not positive.
+    Another number of weights, or one that is not positive, is an InputError.
     """
     if weights is None:
         return [1.0] * count
@@ -89,17 +64,9 @@ def _weight(name: str, value: Any) -> float:
 
 
 def in_range(within: Any, stretches: np.ndarray) -> np.ndarray:
-    """Return the mask of the stretches that lie in a range.
+    """Return the mask of the stretches, any shape, in the range `within`; None for all.
 
-    Args:
-        within: lowest and highest stretch, or None for all.
-        stretches: stretches, any shape.
-
-    Returns:
-        Mask, the same shape.
-
-    Raises:
-        InputError: `within` is no pair of stretches, the first below the second.
+    No pair of ascending stretches is an InputError.
     """
     if within is None:
         return np.ones(np.shape(stretches), dtype=bool)
