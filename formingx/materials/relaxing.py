@@ -343,7 +343,7 @@ class GeneralisedMaxwell(RelaxingMaterial):
             yield k, constants[f"mu_{k}"], constants[f"tau_{k}"]
 
     def _past(self, internal: dict[str, Any], time_step: Any) -> Any:
-        """Return the earlier deformation (UFL) that a step of the branches needs, by default C at its start; or None."""
+        """Return the earlier deformation (UFL) that a step of branches needs, by default C at its start; or None."""
         return entries(internal["C"]) if self._stores_C else None
 
     def _deformation_history(self, C: Entries, internal: dict[str, Any], time_step: Any) -> dict[str, Any]:
