@@ -39,68 +39,34 @@ class Rule(Protocol):
 
     @property
     def extent(self) -> np.ndarray:
-        """Share of each point in the contact length of the face, shape (n,), length; in three dimensions an area.
-
-        The shares are taken in the reference configuration.
-        """
+        """Share of each point in the reference contact length, shape (n,), length; in three dimensions an area."""
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the contact points; collective.
+        """Return the displacement of the points, shape (n, components) or (n, components, k); collective.
 
-        Args:
-            values: locally owned unknowns, any unit, shape (m,), or several sets as columns, shape (m, k).
-
-        Returns:
-            Displacement, shape (n, components) or (n, components, k), in the unit of `values`.
+        values: locally owned unknowns in the same unit, shape (m,) or (m, k).
         """
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
-        """Add contact forces to the residual; collective.
-
-        Args:
-            values: locally owned entries of the residual, changed in place.
-            forces: forces at the points, shape (n, components), in the unit of `values`.
-        """
+        """Add forces at the points, shape (n, components), to owned entries of the residual in place; collective."""
 
     def add_unit_forces(self, E: np.ndarray, points: np.ndarray | None) -> None:
-        """Add unit forces at k points, in each component, to columns of the residual; collective.
+        """Add unit forces at points (local numbers; None on another rank) to columns E in place; collective.
 
-        Args:
-            E: columns with the locally owned entries of the residual, shape (m, k components), changed in place. The
-                forces are ordered by point, then by component.
-            points: local numbers of the points, shape (k,); None on a rank that does not own them.
+        E: owned entries of the residual, shape (m, k components), ordered by point, then by component.
         """
 
     def nodal_stiffness(self, stiffness: np.ndarray) -> np.ndarray:
-        """Return the stiffness of each point with respect to the unknowns that move the point.
+        """Return the stiffness by the m unknowns (`dofs`) of each point, shape (n, m, m).
 
-        Args:
-            stiffness: derivative of the force at a point by its position, shape (n, components, components).
-
-        Returns:
-            For each point, derivative of the nodal forces by the m unknowns that move the point (`dofs`), shape (n, m,
-            m).
+        stiffness: derivative of the force at a point by its position, shape (n, components, components).
         """
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
-        """Interpolate a scalar field to the contact points.
-
-        Args:
-            values: values at the nodes of each point (`nodes`), shape (n,) if a point is a node, else (n, nodes).
-
-        Returns:
-            Values at the points, shape (n,).
-        """
+        """Interpolate values at the `nodes` of each point, shape (n,) or (n, nodes), to the points, shape (n,)."""
 
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
-        """Return the ratio of deformed to reference area of the face at the contact points; collective.
-
-        Args:
-            fields: locally owned unknowns of the state.
-
-        Returns:
-            Area ratio, shape (n,).
-        """
+        """Return the ratio of deformed to reference area at the points, shape (n,); fields: owned; collective."""
 
 
 class _NodalPoints:

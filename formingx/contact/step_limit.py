@@ -21,36 +21,22 @@ class EventPrediction(Protocol):
     """
 
     def step_length(self, length: float) -> float | None:
-        """Return the arc length of the step, limited by the number of gaps that close in it.
+        """Return the arc length, at most `length`, limited by the number of gaps that close in it.
 
-        Args:
-            length: largest arc length.
-
-        Returns:
-            Arc length, at most `length`. None if the prediction failed; `closures` and `bend` then also return None.
+        None if the prediction failed; `closures` and `bend` then also return None.
         """
 
     def closures(self, length: float) -> list[tuple] | None:
-        """Return the gap closures predicted within the step.
+        """Return the gap closures within an arc length, a tuple of arrays for the n owned points of each contact.
 
-        Args:
-            length: arc length of the step.
-
-        Returns:
-            For each active contact a tuple of arrays for its n owned points: arc length of the gap closure, shape (n,);
-            position there, relative to the tool, shape (n, 2), length; mask of points with a
-            predicted contact force, shape (n,); derivative of the position by arc length just before the closure, shape
-            (n, 2), length. None if the prediction failed.
+        Arc length, shape (n,); position there relative to the tool, shape (n, 2), length; mask of points with a
+        predicted force, shape (n,); d(position)/ds just before, shape (n, 2). None if the prediction failed.
         """
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the deviation of the predicted path from the tangent of the state.
+        """Return the predicted path minus the tangent at an arc length: changes of x, shape (n,), and of the control.
 
-        Args:
-            length: arc length along the tangent.
-
-        Returns:
-            Change of x, locally owned entries, shape (n,), and of the control; None if it is zero or unknown.
+        None if it is zero or unknown.
         """
 
 
@@ -62,15 +48,7 @@ class EventPredictor(Protocol):
         """True if contact events are predicted for the contacts that are active now."""
 
     def predict(self, curve: Any, state: Any) -> EventPrediction | None:
-        """Return the contact events after an accepted state.
-
-        Args:
-            curve: path solver (`solve.arc_length.Curve`), for the tangent at the state.
-            state: the accepted state.
-
-        Returns:
-            The prediction; None if no events can be predicted.
-        """
+        """Return the contact events after an accepted state; None if none can be predicted."""
 
 
 class TrialStep(NamedTuple):

@@ -17,67 +17,32 @@ class BodyModel(ABC):
 
     @abstractmethod
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """Return the outward normal and the measure of a boundary on which a load acts.
-
-        Args:
-            name: name of the boundary.
-            quadrature_degree: degree of the quadrature on it.
-
-        Returns:
-            Outward reference normal (UFL, shape (2,)) and measure.
-        """
+        """Return the outward reference normal (UFL, shape (2,)) and the measure of a boundary on which a load acts."""
 
     @abstractmethod
     def constraints(self, support: Any) -> list[Any]:
-        """Return the constraints that a support imposes on the displacement field.
-
-        Args:
-            support: the `Support`.
-
-        Returns:
-            List of `Constrained` and `ConstrainedMean`.
-        """
+        """Return the `Constrained` and `ConstrainedMean` that a support imposes on the displacement field."""
 
     @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Map points of the body to the mesh on which the fields live.
+        """Return the points on the mesh of the fields for points of the body, shape (n, 2), length.
 
-        For a solid they are the points themselves, for a membrane the points of the mid-surface at the same R.
-
-        Args:
-            points: reference positions in the body, shape (n, 2), length.
-
-        Returns:
-            Reference positions on the mesh of the fields, shape (n, 2), length.
+        For a solid they are the points themselves, for a membrane those of the mid-surface at the same R.
         """
 
     @abstractmethod
     def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
-        """Return the integral of a density over the reference volume of some layers.
+        """Return the integral of a density (UFL scalar) over the reference volume of layers; per depth in plane strain.
 
-        Args:
-            density: density per reference volume (UFL scalar), such as an energy density.
-            layers: names of the layers.
-            metadata: metadata of the UFL measure, such as the quadrature degree; None: the scene's quadrature.
-
-        Returns:
-            The integral (UFL form), density times length^3; in plane strain per unit depth.
+        metadata: of the UFL measure; None: the scene's quadrature.
         """
 
     @abstractmethod
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return the heights at which functions of the position are evaluated in a layer.
+        """Return the heights at which functions of the position are evaluated in a layer, shape (n,), length.
 
-        For a solid they are the heights Z of the points. For a membrane, whose mesh is the mid-surface of all layers,
-        they are the heights halfway between the faces of the layer.
-
-        Args:
-            layer: name of the layer.
-            R: radii of the points, shape (n,), length.
-            Z: heights of the points on the mesh of the fields, shape (n,), length.
-
-        Returns:
-            Heights in the layer, shape (n,), length.
+        For a solid they are Z. For a membrane, the mid-surface of all layers, they lie halfway between the layer's
+        faces.
         """
 
     @abstractmethod
@@ -102,7 +67,4 @@ class BodyModel(ABC):
 
     @abstractmethod
     def _energy(self, density: Any) -> Any:
-        """Return the integral of an energy density over the body, divided by stress times volume (UFL form).
-
-        density: function of (`MaterialTerms`, deformation gradient) that returns the density of a material (stress).
-        """
+        """Return the integral over the body of density(`MaterialTerms`, F) (stress), over stress times volume (UFL)."""

@@ -233,18 +233,11 @@ class MixedPressure(Model):
         return Locking(mean, float(body.slenderness[worst]), body.place(worst)) if mean > WALL_ERROR else None
 
     def terms(self, J, p, modulus, eps):
-        r"""Return the energy density that enforces incompressibility, a Lagrange multiplier with a penalty.
+        r"""Return [(energy density (UFL, stress), metadata)] of a Lagrange multiplier p with a penalty.
 
         .. math:: p (J - 1) - \frac{\epsilon p^2}{16 \mu}
 
-        Args:
-            J: det F (UFL scalar).
-            p: pressure, positive in tension (UFL scalar, stress).
-            modulus: shear modulus mu of the layer (UFL scalar, stress).
-            eps: penalty parameter epsilon (UFL scalar); not used if the model has eps = 0.
-
-        Returns:
-            List of (energy density (UFL, stress), metadata of the UFL measure that integrates it).
+        p: positive in tension (stress). modulus: shear modulus mu (stress). eps: not used if the model has eps = 0.
         """
         density = p * (J - 1)
         if self.eps > 0:
@@ -294,20 +287,11 @@ class DisplacementPenalty(Model):
                                  f" no constants that vary over the body, and no histories; use MixedPressure()")
 
     def terms(self, J, p, modulus, eps):
-        r"""Return the energy density of the penalty, eq. (3.4.1) of Song (1993), with its quadrature rule.
+        r"""Return [(energy density (UFL, stress), metadata)] of the penalty, eq. (3.4.1) of Song (1993).
 
         .. math:: \frac{\mu}{\epsilon} (I_3 - 1)^2, \qquad I_3 = J^2
 
-        The factor mu makes epsilon dimensionless; (3.4.1) has none.
-
-        Args:
-            J: det F (UFL scalar).
-            p: not used.
-            modulus: shear modulus mu of the layer (UFL scalar, stress).
-            eps: penalty parameter epsilon (UFL scalar).
-
-        Returns:
-            List of (energy density (UFL, stress), metadata of the UFL measure with the quadrature rule).
+        The factor mu, the shear modulus of the layer (stress), makes epsilon dimensionless; (3.4.1) has none.
         """
         rule = _RULES[self.points]
         metadata = {} if rule is None else {

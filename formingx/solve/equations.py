@@ -89,11 +89,7 @@ class Examined(Protocol):
     facts: dict[str, Any]
 
     def draw(self, file: str | PathLike[str], title: str) -> None:
-        """Draw the last good state to an image file with a title, on rank 0.
-
-        Raises:
-            InputError: there is nothing to draw.
-        """
+        """Draw the last good state with a title, on rank 0; raise `InputError` if there is nothing to draw."""
 
 
 class Residual(Protocol):
@@ -120,26 +116,18 @@ class Residual(Protocol):
         """Compute F(x, control) in `out`, and set `force_scale`."""
 
     def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> PETSc.Mat:
-        """Compute dF/dx in `matrix`, and return this matrix.
+        """Compute and return dF/dx in `matrix`, at the unknowns x and a control.
 
-        Args:
-            x: unknowns at which the derivative is taken.
-            control: control at which it is taken.
-            one_sided: True if the next step starts at (x, control). Where F has a kink, the derivative is then taken on
-                the side to which this step goes.
+        one_sided: True if the next step starts there. Where F has a kink, the derivative is then taken on its side.
         """
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, one_sided: bool = False) -> None:
-        """Compute dF/dcontrol, the derivative of the residual F at (x, control), in `out`.
-
-        one_sided: True if the next step starts at (x, control). Where F has a kink, the derivative is then taken on the
-        side to which this step goes.
-        """
+        """Compute dF/dcontrol at (x, control) in `out`; `one_sided`: see `tangent`."""
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        """Return the inner product of two changes a and b of x, from which arc length is computed; dimensionless.
+        """Return the dimensionless inner product of changes a and b of x, for arc lengths: such as the mean of u_a .
 
-        An example is the mean over the body of u_a . u_b with displacements u over the size of the body.
+        u_b. The displacements u are over the size of the body.
         """
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
@@ -194,21 +182,15 @@ class ActiveSet(Protocol):
         return None
 
     def begin(self, old: ProblemState | None = None) -> None:
-        """Start the increments of all contacts for a run of Newton's method; `old`: the last accepted state, or None.
-        """
+        """Start the increments of all contacts for a run of Newton's method, from the last accepted state or None."""
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
-        """Linearise the contact law for an iteration at (x, control).
-
-        F: residual there; its contact forces are replaced by the forces of the linearised law, in place.
-        """
+        """Linearise the contact law for an iteration at (x, control); its forces replace those in the residual F."""
 
     def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Return for each face the difference of two contact stiffnesses per area at an accepted state (x, control).
+        """Return for each face two contact stiffnesses' difference at an accepted state, (n, c, c), stress/length.
 
-        Where F has a kink, the stiffness at the start of the next step differs from the one in the tangent last
-        computed. The first minus the second is returned, for n points with c components, shape (n, c, c),
-        stress/length.
+        At a kink of F it is that for the start of the next step minus that in the last tangent; n points, c components.
         """
         return []
 
@@ -254,18 +236,11 @@ class Histories(Protocol):
 
     def step_error(self, past: Sequence[ProblemState], share: Array, x: Array,
                    control: float) -> tuple[float, float]:
-        """Estimate the time integration error of a step.
+        """Estimate the time integration error of a step from the last of `past` to x, shape (n,).
 
-        Args:
-            past: k accepted states; the step begins at the last of them.
-            share: weights of the unknowns of `past` and of x, shape (k + 1,). Their weighted sum interpolates the
-                unknowns at the middle of the step in time.
-            x: unknowns at the end of the step, locally owned entries, shape (n,).
-            control: load parameter (control) at the end of the step, dimensionless.
-
-        Returns:
-            Relative error of the stress at the end of the step, and its persistent part. That part remains if the
-            body then relaxes at constant deformation for another duration of the step.
+        share: weights of `past` and of x that interpolate the unknowns halfway in time, shape (k + 1,). Return the
+        relative error of the stress, and the part that remains if the body then relaxes at constant deformation for
+        another duration of the step.
         """
         return 0.0, 0.0
 
@@ -278,10 +253,10 @@ class Stages(Protocol):
         """Current step data: amplitudes as functions of the control, and inactive items."""
 
     def enter(self, setting: StepData, x: Array, control: float) -> None:
-        """Set new step data, for a path that begins at (x, control); x: locally owned entries, shape (n,).
+        """Set new step data, for a path that begins at (x, control), x of shape (n,).
 
-        The prescribed values of constrained unknowns start from their values in x. If `setting.fading` is True, the
-        unbalanced forces at (x, control) decrease to 0 as the control goes to 1.
+        Constrained unknowns start from their values in x. If `setting.fading` is True, the unbalanced forces there
+        decrease to 0 as the control goes to 1.
         """
 
     def restore(self, state: ProblemState) -> None:
@@ -291,12 +266,9 @@ class Stages(Protocol):
         """Return a context in which the problem has the unknowns, step data and history variables of a state."""
 
     def activate(self, number: int, x: Array, control: float) -> None:
-        """Activate an item of the scene at (x, control); a contact begins with new history variables.
+        """Activate item `number` of `Scene.items` at (x, control); a contact begins with new history variables.
 
-        number: index of the item in `Scene.items`.
-
-        Raises:
-            InputError: a tool would be activated inside the body.
+        Raise `InputError` if a tool would be activated inside the body.
         """
 
 
@@ -341,10 +313,7 @@ class ProblemUnits(Protocol):
         return "the equations are not defined there"
 
     def examine(self, last: ProblemState | None, attempt: Attempt | None) -> Examined | None:
-        """Examine the body in the last good state and in a failed attempt, to find causes of the failure; collective.
-
-        The result holds numbers, such as the smallest J, and draws the body. It is None for equations without a body.
-        """
+        """Examine the body in the last good state and a failed attempt; None without a body; collective."""
         return None
 
 

@@ -145,21 +145,10 @@ class Drag(Protocol):
     """
 
     def forces(self, x: Array) -> Array:
-        """Return the forces that are added to F at the unknowns x.
-
-        Args:
-            x: unknowns, locally owned entries, shape (n,).
-
-        Returns:
-            Dimensionless forces, locally owned entries, shape (n,).
-        """
+        """Return the dimensionless forces that are added to F at x, locally owned entries, shape (n,) both."""
 
     def add_to(self, tangent: PETSc.Mat) -> None:
-        """Add the derivative of the forces with respect to x.
-
-        Args:
-            tangent: tangent matrix, changed in place.
-        """
+        """Add the derivative of the forces with respect to x to a tangent matrix, in place."""
 
 
 class BorderedNewton:
