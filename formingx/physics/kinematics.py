@@ -276,15 +276,11 @@ def _along_z(X):
 
 
 def volume_ratio(F):
-    r"""Return the volume ratio of a deformation gradient.
+    r"""Return the volume ratio of a deformation gradient F (UFL, shape (3, 3)), a UFL scalar.
 
     .. math:: J = \det F
 
-    Args:
-        F: deformation gradient (UFL, shape (3, 3)).
-
-    Returns:
-        J (UFL scalar); products that vanish for an F with block structure are left out.
+    Products that vanish for an F with block structure are left out.
     """
     J = F[2, 2] * (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
     if is_block(F):
@@ -300,15 +296,9 @@ def is_block(F):
 
 
 def invariants(F):
-    r"""Return the first two invariants of C = F^T F.
+    r"""Return the first two invariants of C = F^T F (UFL scalars), for F of shape (3, 3).
 
     .. math:: I_1 = \mathrm{tr}\, C, \qquad I_2 = \tfrac{1}{2} (I_1^2 - \mathrm{tr}\, C^2)
-
-    Args:
-        F: deformation gradient (UFL, shape (3, 3)).
-
-    Returns:
-        I1 and I2 (UFL scalars).
     """
     C = F.T * F
     I1 = ufl.tr(C)
@@ -388,18 +378,11 @@ def _powers_across(F, b, a):
 
 
 def cofactor_change(F, H):
-    r"""Return the first-order change of the cofactor of F.
+    r"""Return the first-order change of the cofactor of F by a change H of F (UFL, shape (3, 3) each).
 
     .. math:: (\delta \, \mathrm{cof} F)_{ij} = F_{ac} H_{bd} + H_{ac} F_{bd} - F_{ad} H_{bc} - H_{ad} F_{bc}
 
     Here (i, a, b) and (j, c, d) are cyclic permutations of (1, 2, 3).
-
-    Args:
-        F: deformation gradient (UFL, shape (3, 3)).
-        H: change of F (UFL, shape (3, 3)).
-
-    Returns:
-        Change of cof F (UFL, shape (3, 3)).
     """
     def entry(i, j):
         (a, b), (c, d) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)

@@ -68,24 +68,10 @@ class Model:
         return f"{type(self).__name__}({', '.join(f'{name}={value!r}' for name, value in given.items())})"
 
     def check(self, scene: Any) -> None:
-        """Check that the body model allows all supports, contacts and materials of a model declaration.
-
-        Args:
-            scene: the model declaration (`Scene`).
-
-        Raises:
-            InputError: the body model excludes one of them.
-        """
+        """Raise `InputError` if the body model excludes a support, contact or material of a scene."""
 
     def locking(self, mesh: Any) -> Locking | None:
-        """Estimate the locking of the elements in the triangles of a mesh; by default no locking. Collective.
-
-        Args:
-            mesh: the `Mesh`.
-
-        Returns:
-            The warning, or None if no warning is necessary.
-        """
+        """Return the warning that elements lock in a mesh, or None, the default; collective."""
         return None
 
 

@@ -125,9 +125,9 @@ class Residual(Protocol):
         """Compute dF/dcontrol at (x, control) in `out`; `one_sided`: see `tangent`."""
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        """Return the dimensionless inner product of changes a and b of x, for arc lengths: such as the mean of u_a .
+        """Return the inner product of two changes a and b of x, from which arc length is computed; dimensionless.
 
-        u_b. The displacements u are over the size of the body.
+        An example is the mean over the body of the products of displacements, over its squared size.
         """
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
@@ -188,9 +188,10 @@ class ActiveSet(Protocol):
         """Linearise the contact law for an iteration at (x, control); its forces replace those in the residual F."""
 
     def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Return for each face two contact stiffnesses' difference at an accepted state, (n, c, c), stress/length.
+        """Return for each face the change of the contact stiffness for the next step from an accepted state.
 
-        At a kink of F it is that for the start of the next step minus that in the last tangent; n points, c components.
+        At a kink of F the stiffness there differs from that in the last tangent, which is subtracted. Shape (n, c, c),
+        stress/length, for n points with c components.
         """
         return []
 

@@ -43,7 +43,8 @@ class JumpRules:
 
     @property
     def tried_early(self) -> bool:
-        """True to snap after two failed steps; with history variables a pressure first tries its smallest step."""
+        """True if a snap-through is tried after two failed steps, False if only after the smallest step has failed.
+        False for a pressure with history variables, since slip in the viscous motion changes the final state."""
         return self.rule in ("snap_through", *["continue_volume"] * (not self._problem.has_history))
 
     def found_no_equilibrium_near(self, old: State) -> bool:

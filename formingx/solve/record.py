@@ -134,7 +134,7 @@ class Record:
     def restore(self) -> int:
         """Restore the last accepted state in the problem; return the number of last states with its step data.
 
-        The first of these comes first, since constrained values and fading forces follow from it.
+        The first of these is restored before it, since constrained values and fading forces follow from it.
         """
         setting = self.last.setting
         states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))

@@ -275,7 +275,8 @@ class CondensedPoints:
         """Compute the rates F of the contact forces along the path, with statuses that satisfy Coulomb's law.
 
         Return F, F - S v, shape (m, 2) each, and statuses, shape (m,), found by an active-set search from `status`;
-        else None. u: velocities by arc length, shape (m, 2). S v: part in the factorised tangent. force: shape (m, 2).
+        else None. u: velocities by arc length at constant forces, shape (m, 2). S: stiffness in the factorised tangent;
+        v: velocities. force: shape (m, 2).
         """
         slack = (status != ContactStatus.FREE) & ~self._pulls
         F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]

@@ -331,9 +331,9 @@ def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
 
 def _equations(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pairs of groups whose normals satisfy (N_a + N_b) .
+    """Return the pairs of groups whose normals satisfy N_a.e + N_b.e = 0, shape (k, 2).
 
-    e = 0, shape (k, 2). Also the weights of the equations, shape (k,), and the unit vectors e, shape (k, 3).
+    Also the weights of the equations, shape (k,), and the unit vectors e, shape (k, 3).
     """
     x = np.zeros((int(groups.max()) + 1, 3))
     x[groups.ravel()] = points[triangles.ravel()]

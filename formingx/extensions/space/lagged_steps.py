@@ -88,7 +88,10 @@ class LaggedApproach(Approach):
         self.face.set_closures(places)
 
     def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """Return True if a new point is deeper in the tool than twice its tributary length; x: owned, shape (n,)."""
+        """Return True if a new point is deeper in the tool than twice its tributary length.
+
+        old, new: locally owned unknowns, shape (n,).
+        """
         face = self.face
         a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
@@ -176,7 +179,7 @@ class LaggedApproach(Approach):
 
     def correct(self, fields: np.ndarray, control: float, at_target: bool, sweep: int) -> bool:
         """Close points that penetrated the tool in a step, and renew friction's pressure; True: solve again.
-        Other states than targets need friction; sweep: number of earlier calls for this step."""
+        Gaps close at a target or with lagged friction. sweep: number of earlier calls for this step."""
         late = (at_target or self.has_lagged_friction) and self._close_penetrated(fields, control)
         return (sweep < LAGGED.max_corrections and self.update_pressure(fields, control)) | late
 
