@@ -64,10 +64,11 @@ double crossing(const double *x, const double *w, double theta, double shift, do
 
 
 def gap_closures(law: Any, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> np.ndarray:
-    """Return the arc length at which the gap of each point closes, shape (n,); `length` if open or closed before.
+    """Return the arc length at which the gap of each point closes, shape (n,); `length` if it stays open.
 
-    start, velocity: positions relative to the tool and d/ds, shape (n, c), length. free: mask of the open points.
-    Contact begins at the signed distance -theta, positive inside; theta is the half-width of the contact ramp.
+    It is `length`, too, for points outside the mask `free`, shape (n,), which are closed. start, velocity: positions
+    relative to the tool and d/ds, shape (n, c), length. Contact begins at the signed distance -theta, positive inside;
+    theta is the half-width of the contact ramp.
     """
     arc_lengths, profile = np.full(len(start), float(length)), law.profile
     if profile is not None:

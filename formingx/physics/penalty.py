@@ -201,7 +201,10 @@ class Law(NormalLaw):
         return turned + np.where(out[4 * n:5 * n] == 0, out[11 * n:], 0.0)           # where points do not slide
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
-        """Return distances and elastic slips at x, shape (n, 2), length; slips are 0 without history."""
+        """Return distances and elastic slips at x, shape (n, 2), length, with their gradients, shape (n, 2).
+
+        Slips are 0 without history.
+        """
         near = self.nearest(x)
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
         return Motion(x, near.distance, near.normal, g, dg)
