@@ -84,8 +84,8 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
 def check_hinges(scene: Any) -> None:
     """Raise an InputError if a layer at a hinge is much softer than another layer at the same rim.
 
-    A hinge with weight="area" pulls all layers with one traction, so moduli may differ by a factor of 100; a loaded
-    layer 50 times softer would be squeezed out.
+    A hinge with weight="area" pulls all layers with one traction, so moduli may differ by a factor of 100. A loaded
+    layer may not be 50 times softer: the pressure would squeeze it out.
     """
     moduli = {name: scene.shear_modulus(name) for name in scene.materials}
     for constraint in (constraint for support in scene.supports for constraint in support.constraints()):

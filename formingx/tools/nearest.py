@@ -68,8 +68,8 @@ void nearest(long points, const double *x, long pieces, long lines, const double
 def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return distances from a profile, (n,), gradients, (n, 2), curvatures of level lines, (n,), at x, (n, 2).
 
-    Distances are positive inside. The table has m pieces, `lines` first, (m, 9): origin, direction, 0, lowest and
-    highest length, 0, 0 of a line; centre, 0, 0, sense (1: left), 0, angle, radius, first polar angle of an arc.
+    Distances are positive inside. The table has m pieces, `lines` first, shape (m, 9). A line has origin, direction, 0,
+    lowest and highest length, 0, 0. An arc has centre, 0, 0, sense (1: left), 0, angle, radius, first polar angle.
     """
     n = len(x)
     found = np.empty(4 * n)

@@ -229,7 +229,7 @@ class _PerturbedPaths:
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
         """Return the constraints that determine at which point of its path each run is compared.
 
-        None for the base run is the plane normal to its path; `last` if a stage or a piece of a stage ends at the
+        The first is None for the plane normal to the path; `last` says that a stage or a piece of a stage ends at the
         state.
         """
         setting = self.problem.setting

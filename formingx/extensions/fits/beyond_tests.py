@@ -23,8 +23,7 @@ from .tested import MeasuredRange, nearest_test, principal_strains
 def expected_stretches_beyond_tests(body: Any) -> Iterator[Finding]:
     """Yield warnings for layers with constants that tests leave undetermined, and stretches beyond the tests.
 
-    An expected stretch is the largest one of a free dome for a target, or the square root of the areal draw ratio of a
-    closed mould.
+    For a target it is the largest stretch of a free dome, for a closed mould the root of the areal draw ratio.
     """
     for layer, tested in _tested(body.scene):
         about = f"materials[{layer!r}]"

@@ -232,7 +232,7 @@ class ShiftedTests:
     def branches(self, tau: np.ndarray, factors: np.ndarray) -> np.ndarray:
         """Return the stresses of j branches of unit modulus at all measured points, shape (n, j).
 
-        tau has shape (j,) at the reference temperature; `factors` are the shifts of tests.
+        The relaxation times tau, shape (j,), hold at the reference temperature; `factors` are the shifts of tests.
         """
         found = []
         for spline, a in zip(self._splines, factors):

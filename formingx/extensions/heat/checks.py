@@ -185,7 +185,7 @@ def heat_without_time(body: Any) -> Iterator[Finding]:
 
 @register("start")
 def beyond_known_range(body: Any) -> Iterator[Finding]:
-    """Yield warnings for constants whose range is below that of initial body, tools, air and heaters; collective."""
+    """Yield warnings for constants whose range is smaller than that of body, tools, air and heaters; collective."""
     if body.scene.heat is not None:
         low, high = body.scene.heat.extremes(body.scene)
         yield from _outside_known_range(body.scene, low, high, "the tools and the air may bring it")

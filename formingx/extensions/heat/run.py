@@ -116,7 +116,7 @@ def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any
 
 
 class _Displacement:
-    """Displacement of a body as a quadratic `Function`, evaluated at points or on another mesh; collective."""
+    """Displacement of a body, length, as a quadratic `Function`, at points or on another mesh; collective."""
 
     def __init__(self, displacement: Any, mesh: Mesh):
         space = fem.functionspace(mesh.domain, ("Lagrange", 2, (2,)))

@@ -165,7 +165,7 @@ def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, 
          units: Units) -> Springback:
     """Release a part, then let it cool or relax for `cooling_time`, and return its shape before and after.
 
-    x are the owned unknowns of the part in its tools; `trimmed` is the radius r of its end there, length.
+    The owned unknowns x are those of the part in its tools. Its end there has the radius `trimmed`, length.
     """
     stages = [Stage("release"), *([Stage("cool", duration=cooling_time)] if cooling_time else [])]
     record = Record(problem, Curve(problem, Tolerances()))

@@ -122,8 +122,8 @@ class StateTransfer(NamedTuple):
     def _projected_fields(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return deformation (cells, 6, 6) and pressures (cells, 3, p) in new cells, by least squares in each.
 
-        At corners and midpoints the deformation has rr, rz, zz and hoop entry of b = F F^T/J, cosine and sine of the
-        rotation of F. Pressures, at corners, are dimensionless.
+        The deformation, at corners and midpoints, has rr, rz, zz and hoop entry of b = F F^T/J, then cosine and sine of
+        the rotation of F. Pressures, at corners, are dimensionless.
         """
         rule: Any = basix.make_quadrature(basix.CellType.triangle, _QUADRATURE_DEGREE)
         xi, weights = rule

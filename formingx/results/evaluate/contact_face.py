@@ -117,7 +117,7 @@ class ContactFace:
 def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
     """Return the `FaceContact` objects of a tool, one for each face.
 
-    The tool is a name of it or of a face, the `Tool`, the `Contact`, or None for the only one; any other is an
+    The tool is given as its name or that of a face, as `Tool`, `Contact`, or None for the only one. Others are an
     InputError.
     """
     contacts = path.problem.contacts

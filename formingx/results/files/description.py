@@ -21,7 +21,7 @@ _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "
 def describe(problem: Any) -> dict[str, Any]:
     """Return the description of the scene as JSON data, the same on any number of ranks; collective.
 
-    "mesh" holds counts and sums that change with any coordinate, tag or order of cells; the other entries are public
+    The entry "mesh" holds counts and sums that change with any coordinate, tag or order of cells. The others are public
     attributes of materials, supports, loads, contacts, model and kinematics.
     """
     scene = problem.scene
