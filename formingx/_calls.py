@@ -90,10 +90,7 @@ def _explain_methods(cls: type) -> None:
 def _explained(call: Callable, name: str, skip: int) -> Callable:
     """Return a function that calls another function, and turns its errors into messages about wrong arguments.
 
-    Args:
-        call: the function that is called.
-        name: name of the function, for error messages.
-        skip: number of first arguments (self, cls) that a user does not write.
+    A user does not write the first `skip` arguments (self, cls).
     """
     if getattr(call, "_is_explained", False) or inspect.isgeneratorfunction(call):
         return call
@@ -122,12 +119,7 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
 def _fault(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
     """Return the fault in the arguments of a call as text, or None if they fit the signature and its annotations.
 
-    Args:
-        call: the function.
-        name: name of the function, for the message.
-        skip: number of first arguments (self, cls) that a user does not write.
-        args: positional arguments.
-        given: keyword arguments.
+    A user does not write the first `skip` arguments (self, cls).
     """
     signature = inspect.signature(call)
     try:

@@ -38,11 +38,7 @@ def compile_form(form: Any) -> Any:
 
 
 def compile_expression(expression: Any, points: Any) -> Any:
-    """Return the compiled DOLFINx `Expression` of a UFL expression at points of the reference cell, shape (n, 2).
-
-    The variables of the expression are numbered from 0 here. UFL numbers all variables of a process consecutively, and
-    these numbers are part of the signature. So each problem would otherwise compile its own expression.
-    """
+    """Return the compiled `Expression` at reference points (n, 2); its variables count from 0, to be shared."""
     numbered = map_expr_dag(_Numbered(), expression)
     return _compiled_by_jit(lambda: fem.Expression(numbered, points, jit_options=JIT_OPTIONS))
 
@@ -62,13 +58,9 @@ class _Numbered(MultiFunction):
 
 
 def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
-    """Compile UFL forms by one call of the compiler, which takes less time than a call for each form; collective.
+    """Compile UFL forms, the same on all ranks, by one call of the compiler; collective.
 
-    `compile_form` then finds the compiled forms.
-
-    Args:
-        comm: MPI communicator.
-        forms: the UFL forms, the same on all ranks.
+    It takes less time than a call for each. `compile_form` then finds them.
     """
     options, form_options = jit.get_options(JIT_OPTIONS), ffcx.get_options({"scalar_type": default_scalar_type})
     if not _jit.supported(options):
@@ -79,12 +71,9 @@ def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
 
 
 def _compiled_by_jit(request: Callable[[], Any]) -> Any:
-    """Return a form or an expression that DOLFINx makes, with `_jit` in place of the compiler of DOLFINx.
+    """Return the form or expression that `request` makes by DOLFINx, with `_jit` in place of its compiler.
 
     Each form is compiled once in a process.
-
-    Args:
-        request: function that calls DOLFINx for the form or expression and returns it.
     """
     compiler = jit.ffcx_jit
 
@@ -122,20 +111,10 @@ def collect_communicators() -> None:
 
 
 def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges: Any, edge_tags: Any) -> tuple:
-    """Return a distributed mesh of triangles with its tags; collective.
+    """Return a distributed mesh of triangles, and the `MeshTags` of its cells and facets; collective.
 
-    Rank 0 gives the arrays; on other ranks they have the length 0.
-
-    Args:
-        comm: MPI communicator.
-        cells: point numbers of the triangles, shape (m, 3 or 6), in the order of DOLFINx.
-        points: coordinates, shape (n, 2), or in three dimensions (n, 3), length.
-        cell_tags: tags of the triangles, shape (m,).
-        edges: point numbers of the edges of boundaries, shape (k, 2 or 3).
-        edge_tags: tags of these edges, shape (k,).
-
-    Returns:
-        The `dolfinx.mesh.Mesh`, the `MeshTags` of cells and the `MeshTags` of facets.
+    Rank 0 gives cells (m, 3 or 6) in the order of DOLFINx, points (n, 2 or 3), length, cell tags (m,), edges (k, 2 or
+    3) and edge tags (k,).
     """
     import basix.ufl
     from dolfinx import graph, mesh
@@ -154,27 +133,12 @@ def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges:
 
 
 def assemble_matrix(matrix: Any, form: Any, bcs: Any, diagonal: float = 1.0) -> None:
-    """Add the entries of a compiled bilinear form to a PETSc matrix.
-
-    Args:
-        matrix: the PETSc matrix.
-        form: the compiled form.
-        bcs: list of `dolfinx.fem.DirichletBC`; the rows and columns of their unknowns receive no other entries.
-        diagonal: diagonal entry of these rows.
-    """
+    """Add a compiled form to a PETSc matrix; constrained rows and columns have `diagonal` alone."""
     fem_petsc.assemble_matrix(matrix, form, bcs, diagonal)  # type: ignore[misc]  # types of another variant
 
 
 def assemble_vector(vector: Any, form: Any) -> Any:
-    """Assemble a compiled linear form into a `la.Vector`, with the contributions of other ranks; collective.
-
-    Args:
-        vector: the vector; its entries are replaced.
-        form: the compiled form.
-
-    Returns:
-        Locally owned entries, shape (n,), a view of the vector.
-    """
+    """Assemble a compiled linear form into a `la.Vector`, and return a view of owned entries, (n,); collective."""
     values = vector.array
     values[:] = 0
     _add_to_array(values, form)
@@ -201,21 +165,12 @@ def cell_nodes(mesh: Any) -> Any:
 
 
 def collapsed(space: Any) -> tuple[Any, np.ndarray]:
-    """Return the space of a part of a DOLFINx space, and the numbers of its unknowns in the whole space, shape (n,).
-
-    DOLFINx 0.11 puts the numbers in a list, as one array for each type of cells.
-    """
+    """Return a part of a DOLFINx space, and the numbers of its unknowns in the whole, (n,)."""
     own, numbers = space.collapse()
     return own, np.asarray(numbers).ravel()
 
 
 def tree_of_cells(mesh: Any, padding: float, cells: Any) -> Any:
-    """Return the tree of bounding boxes of cells of a DOLFINx mesh.
-
-    Args:
-        mesh: the mesh.
-        padding: length by which each box is enlarged, length.
-        cells: local numbers of the cells, shape (m,).
-    """
+    """Return the tree of bounding boxes of local cells (m,), enlarged by a padding, length."""
     from dolfinx import geometry
     return geometry.bb_tree(mesh, mesh.topology.dim, entities=cells, padding=padding)

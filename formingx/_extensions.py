@@ -13,10 +13,9 @@ _FOLDER = Path(__file__).parent / "extensions"
 
 @contextlib.contextmanager
 def optional() -> Iterator[None]:
-    """Provide a context in which the import of an extension is skipped if the folder of the extension is missing.
+    """Skip the import of an extension in a `with` block if its folder is missing.
 
-    Raises:
-        ModuleNotFoundError: another module is missing.
+    Another missing module is a ModuleNotFoundError.
     """
     try:
         yield

@@ -45,45 +45,25 @@ NULL = _FFI.NULL
 
 
 def supported(jit_options: dict[str, Any]) -> bool:
-    """Return True if this module can compile forms; otherwise DOLFINx compiles them.
-
-    FFCx must be of version 0.9, 0.10 or 0.11, and a POSIX system must have a C compiler.
-
-    Args:
-        jit_options: options of `dolfinx.jit`; `cffi_debug` and `cffi_verbose` must be off.
-    """
+    """Return True for FFCx 0.9 to 0.11 and a C compiler, without `cffi_debug` and `cffi_verbose`."""
     return (ffcx.__version__.startswith(("0.9.", "0.10.", "0.11.")) and os.name == "posix" and _compiler() is not None
             and not (jit_options["cffi_debug"] or jit_options["cffi_verbose"]))
 
 
 def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) -> str:
-    """Return the name of the library of a form: a digest of the form, the options and the compiler.
-
-    Args:
-        item: UFL form, or (UFL expression, points).
-        jit_options: options of the C compiler and of the cache (`dolfinx.jit.get_options`).
-        form_options: options of FFCx (`ffcx.get_options`).
-    """
+    """Return the name of the library of a form or (expression, points): a digest of it, options and compiler."""
     tag = f"{sorted(form_options.items())}{_command(jit_options)}{_compiler_id()}" if supported(jit_options) else ""
     return "form_" + naming.compute_signature([item], tag)
 
 
 def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
                      ) -> dict[str, tuple[Any, Any, tuple]]:
-    """Return compiled forms and expressions; rank 0 builds all missing ones as one library. Collective.
+    """Return compiled forms and expressions; rank 0 builds all missing ones as one library.
 
-    Args:
-        comm: MPI communicator.
-        items: {name of the library: UFL form, or (UFL expression, points)}; the function `key` makes the names.
-        jit_options: options of the C compiler and of the cache (`dolfinx.jit.get_options`).
-        form_options: options of FFCx (`ffcx.get_options`).
+    Collective.
 
-    Returns:
-        {name of the library: (object of FFCx, namespace with its `ffi` and its library, (None, None))}, as
-        `dolfinx.jit.ffcx_jit` returns for one form.
-
-    Raises:
-        RuntimeError: the compiler failed. On ranks other than 0: FFCx refused an item on rank 0.
+    Items are {name by `key`: UFL form, or (expression, points)}, results {name: (object of FFCx, namespace, (None,
+    None))}. A failed compiler, or an item refused on rank 0, is a RuntimeError.
     """
     folder = Path(jit_options["cache_dir"]) / "formingx"
     if comm.rank == 0:
@@ -104,14 +84,7 @@ def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str,
             ) -> dict[str, Any]:
     """Return {name of the library: result of `_load`} of all items; build the missing libraries.
 
-    Args:
-        items: {name of the library: UFL form, or (UFL expression, points)}.
-        folder: folder of the cache.
-        form_options: options of FFCx.
-        jit_options: options of DOLFINx for the C compiler.
-
-    Raises:
-        RuntimeError: the compiler failed, or a new library cannot be loaded.
+    A failed compiler or loading is a RuntimeError.
     """
     ffi = _declarations(np.dtype(form_options["scalar_type"]).name)
     found = {name: _load(ffi, name, item, folder) for name, item in items.items()}
@@ -130,14 +103,7 @@ def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str,
 
 
 def _load(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
-    """Return (object of FFCx, namespace, (None, None)) from the library of a form; None if it cannot be loaded.
-
-    Args:
-        ffi: declarations of FFCx.
-        name: name of the library, from the function `key`.
-        item: UFL form, or (UFL expression, points).
-        folder: folder of the library.
-    """
+    """Return (object of FFCx, namespace, (None, None)) from the library of a form; None if it cannot be loaded."""
     kind, symbol = (("ufcx_form", naming.form_name(item, 0, name)) if isinstance(item, ufl.Form) else
                     ("ufcx_expression", naming.expression_name(item, name)))
     try:
@@ -162,14 +128,7 @@ def _declarations(scalar: str) -> cffi.FFI:
 
 
 def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], form_options: dict[str, Any]) -> None:
-    """Build one library with all items, and link it in the cache under the name of each item.
-
-    Args:
-        items: {name of the library: UFL form, or (UFL expression, points)}.
-        folder: folder of the cache.
-        jit_options: options of DOLFINx for the C compiler.
-        form_options: options of FFCx.
-    """
+    """Build one library with all items, and link it in the cache under the name of each item."""
     code = "\n".join(_c_code(item, name, form_options) for name, item in items.items())
     files = [folder / f"{name}.so" for name in items]
     made, other = (folder / f"unfinished_{os.urandom(8).hex()}.so" for _ in range(2))
@@ -188,13 +147,7 @@ def _build(items: dict[str, Any], folder: Path, jit_options: dict[str, Any], for
 
 
 def _c_code(item: Any, name: str, form_options: dict[str, Any]) -> str:
-    """Return the C source that FFCx writes for a form or an expression.
-
-    Args:
-        item: UFL form, or (UFL expression, points).
-        name: name of its library, which begins the names of C functions.
-        form_options: options of FFCx.
-    """
+    """Return the C source that FFCx writes for a form or (expression, points); names begin with `name`."""
     write = ffcx.compiler.compile_ufl_objects
     if "namespace" in inspect.signature(write).parameters:                      # FFCx >= 0.11: (sources, suffixes)
         return write([item], namespace=name, options=form_options)[0][1]
@@ -204,14 +157,7 @@ def _c_code(item: Any, name: str, form_options: dict[str, Any]) -> str:
 def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
     """Return the path of a shared library of C functions; compile it if the cache does not contain it.
 
-    Args:
-        name: first part of the file name of the library.
-        code: C source of the functions.
-        flags: options of the compiler.
-
-    Raises:
-        InputError: there is no compiler.
-        RuntimeError: the compiler failed.
+    No compiler is an InputError, its failure a RuntimeError.
     """
     compiler = _compiler()
     if compiler is None:
@@ -233,16 +179,7 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
 
 @functools.cache
 def functions(name: str, header: str, code: str) -> Any:
-    """Return an object whose attributes are functions in C, compiled at the first call.
-
-    Args:
-        name: first part of the file name of their library in the cache.
-        header: declarations of the functions.
-        code: definitions of the functions.
-
-    Raises:
-        RuntimeError: the C compiler failed.
-    """
+    """Return an object of functions in C, compiled at the first call; RuntimeError if that fails."""
     ffi = cffi.FFI()
     ffi.cdef(header)
     return ffi.dlopen(str(library(name, code, ("-O3", "-ffp-contract=off"))))
@@ -259,15 +196,7 @@ def address_of_integers(values: Any) -> Any:
 
 
 def compile_c(command: list[str], code: str) -> None:
-    """Run the compiler on C code.
-
-    Args:
-        command: command and its arguments, which read the code from standard input.
-        code: the code.
-
-    Raises:
-        RuntimeError: the compiler failed, or there is none.
-    """
+    """Run the compiler command on C code from standard input; RuntimeError if it fails or is missing."""
     try:
         result = subprocess.run(command, input=code, capture_output=True, text=True, check=False)
     except OSError as error:

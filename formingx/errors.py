@@ -112,15 +112,7 @@ def non_negative(name: str, value: Any) -> float:
 
 
 def fraction(name: str, value: Any) -> float:
-    """Return an argument that must lie in the open interval (0, 1) as a float.
-
-    Args:
-        name: name of the argument, for the error message.
-        value: the argument.
-
-    Raises:
-        InputError: the argument is not a number, or outside (0, 1).
-    """
+    """Return an argument in the open interval (0, 1) as a float; otherwise an InputError by name."""
     number = finite(name, value)
     if not 0 < number < 1:
         raise InputError(f"{name} = {value!r}: must be between 0 and 1")
@@ -128,15 +120,7 @@ def fraction(name: str, value: Any) -> float:
 
 
 def finite(name: str, value: Any) -> float:
-    """Return an argument that must be a finite number as a float.
-
-    Args:
-        name: name of the argument, for the error message.
-        value: the argument.
-
-    Raises:
-        InputError: the argument is not a finite number.
-    """
+    """Return an argument that must be a finite number as a float; otherwise an InputError by name."""
     try:
         not_a_number = isinstance(value, str | bytes | bytearray) or getattr(value, "ndim", 0) > 0
         if not_a_number or isinstance(value, Complex) and not isinstance(value, Real):
@@ -152,15 +136,7 @@ def finite(name: str, value: Any) -> float:
 
 
 def count(name: str, value: Any) -> int:
-    """Return an argument that must be a positive integer as an int.
-
-    Args:
-        name: name of the argument, for the error message.
-        value: the argument.
-
-    Raises:
-        InputError: the argument is not an integer, or below 1.
-    """
+    """Return an argument that must be a positive integer as an int; otherwise an InputError by name."""
     number = finite(name, value)
     if number != int(number) or number < 1:
         raise InputError(f"{name} = {value!r}: must be a whole number of at least 1")
@@ -168,33 +144,14 @@ def count(name: str, value: Any) -> int:
 
 
 def check_type(name: str, value: Any, kind: Any, what: str) -> Any:
-    """Return an argument, which must be of a given type.
-
-    Args:
-        name: name of the argument, for the error message.
-        value: the argument.
-        kind: the type, or a union of types.
-        what: description of the type, for the message.
-
-    Raises:
-        InputError: the argument is of another type.
-    """
+    """Return an argument of a type or union `kind`; an InputError describes it by `what`."""
     if not isinstance(value, kind):
         raise InputError(f"{name} = {value!r}: must be {what}")
     return value
 
 
 def as_list(name: str, values: Any, what: str) -> list[Any]:
-    """Return an argument that must be a sequence as a list.
-
-    Args:
-        name: name of the argument, for the error message.
-        values: the argument.
-        what: description of the items, for the message.
-
-    Raises:
-        InputError: the argument is not a list, a tuple or another sequence of items.
-    """
+    """Return an argument that must be a sequence of `what` as a list; otherwise an InputError by name."""
     is_item = isinstance(values, str | bytes | dict) or hasattr(values, "_fields")         # a NamedTuple is one item
     if not isinstance(values, Iterable) or is_item or getattr(values, "ndim", 1) == 0:
         raise InputError(f"{name} = {values!r}: must be a list of {what}")
@@ -202,43 +159,19 @@ def as_list(name: str, values: Any, what: str) -> list[Any]:
 
 
 def pair(name: str, values: Any) -> tuple[float, float]:
-    """Return an argument that must be two finite numbers as floats.
-
-    Args:
-        name: name of the argument, for the error message.
-        values: the argument.
-
-    Raises:
-        InputError: the argument is not two finite numbers.
-    """
+    """Return an argument that must be two finite numbers as floats; otherwise an InputError by name."""
     first, second = _finite(name, values, 2, "two numbers")
     return first, second
 
 
 def triple(name: str, values: Any) -> tuple[float, float, float]:
-    """Return an argument that must be three finite numbers as floats.
-
-    Args:
-        name: name of the argument, for the error message.
-        values: the argument.
-
-    Raises:
-        InputError: the argument is not three finite numbers.
-    """
+    """Return an argument that must be three finite numbers as floats; otherwise an InputError by name."""
     first, second, third = _finite(name, values, 3, "three numbers")
     return first, second, third
 
 
 def direction(name: str, values: Any) -> np.ndarray:
-    """Return an argument with three components of a direction as a unit vector, shape (3,).
-
-    Args:
-        name: name of the argument, for the error message.
-        values: three numbers.
-
-    Raises:
-        InputError: the argument is not three finite numbers, or all 0.
-    """
+    """Return three finite numbers, not all 0, as a unit vector, shape (3,); otherwise an InputError."""
     vector = np.array(triple(name, values))
     if not vector.any():
         raise InputError(f"{name} = {values!r}: must not be 0 in all components")
@@ -246,17 +179,7 @@ def direction(name: str, values: Any) -> np.ndarray:
 
 
 def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
-    """Return an argument that must be n finite numbers as floats.
-
-    Args:
-        name: name of the argument, for the error message.
-        values: the argument.
-        n: required length of the argument.
-        what: description of the argument, for the error message.
-
-    Raises:
-        InputError: the argument is not n finite numbers.
-    """
+    """Return an argument that must be n finite numbers as floats; otherwise an InputError by name and `what`."""
     found = as_list(name, values, what)
     if len(found) != n:
         raise InputError(f"{name} = {values!r}: must be {what}")
@@ -264,15 +187,7 @@ def _finite(name: str, values: Any, n: int, what: str) -> list[float]:
 
 
 def finite_array(name: str, values: Any) -> np.ndarray:
-    """Return an argument that must be finite numbers as an array of floats, of the same shape.
-
-    Args:
-        name: name of the argument, for the error message.
-        values: the argument.
-
-    Raises:
-        InputError: a value is not a finite number.
-    """
+    """Return an argument that must be finite numbers as an array of floats, of the same shape; or an InputError."""
     try:
         found = np.asarray(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -283,16 +198,7 @@ def finite_array(name: str, values: Any) -> np.ndarray:
 
 
 def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
-    """Return an argument with coordinates of points as an array of floats, shape (n, components).
-
-    Args:
-        name: name of the argument, for the error message.
-        values: the points, shape (..., components).
-        components: number of coordinates.
-
-    Raises:
-        InputError: the argument has another shape, or is not numeric.
-    """
+    """Return points, shape (..., components), as an array of floats, (n, components); otherwise an InputError."""
     try:
         found = np.asarray(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
@@ -305,13 +211,8 @@ def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
 def values(name: str, function: Callable, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
     """Call a user's function of arrays, and return its values as floats, of the shape of the arrays.
 
-    Args:
-        name: name of the function, for the message.
-        function: the function.
-        arrays: {name: array} of the arguments of the function in order, all of one shape.
-
-    Raises:
-        InputError: the function fails, or a value is not finite. An InputError of the function itself is passed on.
+    The arrays are {name: array} in order. A failure, or a value that is not finite, is an InputError; one of the
+    function itself is passed on.
     """
     arguments = ", ".join(arrays) if len(arrays) == 1 else f"({', '.join(arrays)})"
     try:
@@ -331,15 +232,7 @@ def values(name: str, function: Callable, arrays: Mapping[str, np.ndarray]) -> n
 
 
 def file_path(name: str, value: Any) -> Path:
-    """Return the name of a file or a folder as a path.
-
-    Args:
-        name: name of the argument, for the error message.
-        value: the argument.
-
-    Raises:
-        InputError: the argument is not a name of a file.
-    """
+    """Return the name of a file or a folder as a path; otherwise an InputError by name."""
     if not isinstance(value, str | os.PathLike) or not os.fspath(value) or "\0" in os.fsdecode(value):
         raise InputError(f"{name} = {value!r}: must be the name of a file or a folder")
     return Path(value)
@@ -361,15 +254,7 @@ def check_name(kind: str, name: Any, names: Any) -> None:
 
 
 def call_on_all_ranks(comm: Any, calls: Iterable[Callable[[], Any]]) -> None:
-    """Call functions on all ranks, and raise an InputError on all ranks if one of them raises it; collective.
-
-    Args:
-        comm: MPI communicator.
-        calls: the functions, without arguments.
-
-    Raises:
-        InputError: a function raised it on some rank.
-    """
+    """Call functions on all ranks, and raise an InputError on all ranks if one of them raises it; collective."""
     refused = None
     for call in calls:
         try:

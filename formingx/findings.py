@@ -62,13 +62,9 @@ _registered: dict[Moment, list[Check[Any]]] = {"scene": [], "start": [], "end": 
 
 
 def register(moment: Moment) -> Callable[[_Check], _Check]:
-    """Return a decorator that registers a function as a check; checks are called in the order of registration.
+    """Return a decorator that registers a check for "scene", "start", "end" or "failure", in order.
 
-    Args:
-        moment: moment at which the check is called: "scene", "start", "end" or "failure".
-
-    Raises:
-        InputError: the moment is unknown.
+    An unknown moment is an InputError.
     """
     check_name("register: moment", moment, _registered)
 
@@ -80,14 +76,7 @@ def register(moment: Moment) -> Callable[[_Check], _Check]:
 
 
 def findings_at(moment: Moment, subject: Any) -> list[Finding]:
-    """Call all checks that are registered for a moment, and return their findings, the worst first; collective.
-
-    After a run a check that raises an error does not lose the run: the error becomes a finding.
-
-    Args:
-        moment: "scene", "start", "end" or "failure" (`Moment`).
-        subject: subject of the checks, such as the `Path` after a run (`Check`).
-    """
+    """Return the findings of all checks of a moment, worst first; an error after a run is one, too; collective."""
     call = _findings_or_error if moment in ("end", "failure") else _findings
     return worst_first(finding for check in _registered[moment] for finding in call(check, subject))
 
@@ -127,11 +116,6 @@ def without_notes(findings: Iterable[Finding]) -> list[Finding]:
 
 
 def log_findings(findings: Sequence[Finding], rank: int) -> None:
-    """Log each warning and each serious finding once, as a warning of the logger "formingx".
-
-    Args:
-        findings: the findings; notes are left out.
-        rank: rank of the calling process; only rank 0 logs.
-    """
+    """Log each warning and serious finding once, on rank 0, as a warning of the logger "formingx"."""
     for finding in dict.fromkeys(without_notes(findings)) if rank == 0 else ():
         log.warning("%s: %s", finding.about, finding.text)

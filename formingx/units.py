@@ -149,12 +149,7 @@ class Units:
         return f"{column} [{unit}]" if unit else column
 
     def _derived(self, names: dict[str, float], power: int) -> str:
-        """Return the unit of stress times a power of length.
-
-        Args:
-            names: {name of a unit: size in SI units}; the name of a unit of equal size is preferred.
-            power: power of length.
-        """
+        """Return the unit of stress times a power of length; a name {unit: size in SI} of equal size is preferred."""
         if not (self.length and self.stress):
             return ""
         size = STRESSES[self.stress] * LENGTHS[self.length] ** power

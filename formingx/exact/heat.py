@@ -96,11 +96,7 @@ def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callab
 
     .. math:: -k T_s'' = q, \qquad k T_s'(0) = h_0 (T_s(0) - T_{air,0}), \qquad -k T_s'(d) = h_1 (T_s(d) - T_{air,1})
 
-    Args:
-        slab: the slab.
-        h: heat transfer coefficients of the faces x = 0 and x = d.
-        air: temperatures of the air at the two faces.
-        source: heat source q per volume, a function of x, power/length^3; None: no source.
+    h and air have values of both faces; q is a function of x, power/length^3, or None.
     """
     d, k = slab.thickness, slab.conductivity
     nodes, weights = np.polynomial.legendre.leggauss(60)
@@ -214,13 +210,8 @@ def _finite_volumes(slab: Slab, start: float, fluxes: tuple, times: Any, cells: 
                     source: Callable | None) -> np.ndarray:
     """Return the temperatures at the nodes of a slab at k times, by finite volumes, shape (k, cells + 1).
 
-    Args:
-        slab: the slab.
-        start: uniform initial temperature.
-        fluxes: heat fluxes into both faces, power/length^2, two functions of the temperature of the face.
-        times: times in ascending order, shape (k,).
-        cells: number of intervals between nodes.
-        source: heat source per volume, power/length^3, as a function of position; None: no source.
+    Two functions of the face temperature give the fluxes into the faces, power/length^2; the source, power/length^3, is
+    one of position. Times ascend, (k,).
     """
     from scipy.integrate import solve_ivp
     from scipy.sparse import diags

@@ -150,15 +150,8 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
     the meridian and lambda_1 its stretch. R and r are the reference and deformed radius. The pole stretch increases in
     steps. The secant method finds the pressure of each step, for which the circumferential stretch is 1 at the rim.
 
-    Args:
-        pole_stretch: stretch at the pole, above 1.
-        radius: reference radius, length.
-        thickness: reference thickness, length.
-        c10: constant of I1, stress, as a function of the reference radius R, length.
-        c01: constant of I2, stress.
-
-    Raises:
-        InputError: no pressure was found.
+    Lengths are in the reference configuration, c10 is a function of R, and both constants are stresses. A search
+    without pressure raises an InputError.
     """
     from scipy.integrate import solve_ivp
     from scipy.optimize import root_scalar

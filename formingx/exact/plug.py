@@ -155,18 +155,8 @@ def _continuation(derivatives: Callable, ends: Callable, s: np.ndarray, y: np.nd
                   goal: float, radius: float) -> Any:
     """Return the solution of a boundary value problem at a travel by `solve_bvp`, in steps from a smaller travel.
 
-    Args:
-        derivatives: function of (s, y, p) that returns dy/ds, shape (3, n).
-        ends: boundary conditions: function of (travel, y at s = 0, y at s = 1, p) that returns their residuals.
-        s: points of the guess on [0, 1], shape (n,).
-        y: guess of the unknowns y(s), shape (3, n); its second row is proportional to the travel.
-        p: guess of the unknown parameters of the problem.
-        depth: travel of the guess, over the radius.
-        goal: travel of the solution, over the radius.
-        radius: reference radius of the membrane, for the error message, length.
-
-    Raises:
-        InputError: a step of the continuation does not converge.
+    `derivatives` maps (s, y, p) to dy/ds, (3, n), and `ends` (travel, y(0), y(1), p) to residuals. The guess has s
+    (n,), y (3, n) and parameters p; travels are over the radius. A step that fails is an InputError.
     """
     from scipy.integrate import solve_bvp
     while True:
@@ -270,25 +260,13 @@ def _tensions(t: float, l2: float) -> tuple[float, float]:
               T_2 = \frac{\lambda_2}{\lambda_1} - (\lambda_1 \lambda_2)^{-3}
 
     Tensions are per deformed length, over 2 c10 h0 (h0: reference thickness).
-
-    Args:
-        t: meridional tension T1.
-        l2: circumferential stretch lambda_2.
     """
     l1 = meridional_stretch(t * l2, l2)
     return l1, l2 / l1 - (l1 * l2)**-3
 
 
 def _state_after(length: float, y: np.ndarray, derivatives: Callable) -> np.ndarray:
-    """Return the state (R, r, z, phi, T1) of the meridian at a distance from a point with the state y, shape (5,).
-
-    Lengths are over the reference radius of the membrane, tensions over 2 c10 h0 (h0: reference thickness).
-
-    Args:
-        length: distance, in the variable of `derivatives`: arc length or reference radius.
-        y: state (reference radius, deformed radius, height, slope, meridional tension), shape (5,).
-        derivatives: function of the five entries of a state that returns their derivatives by the distance.
-    """
+    """Return the state (R, r, z, phi, T1), shape (5,), of the meridian at a `length` from a point with state y."""
     return y if length == 0 else _integrate(length, y, derivatives).y[:, -1]
 
 
@@ -301,15 +279,8 @@ def _integrate(length: float, y: np.ndarray, derivatives: Callable, **options: A
 def _contact_derivatives(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
     """Return a function of (R, r, z, phi, T1) that gives the derivatives of the five by arc length, in this order.
 
-    It holds where the membrane touches the rounded edge or the vertical side of the plug. R and r are the reference and
-    deformed radius, z is the height, phi the slope of the meridian, T1 the meridional tension. Lengths are over the
-    reference radius of the membrane, tensions over 2 c10 times the reference thickness.
-    `membrane_sliding_over_plug` states the equations.
-
-    Args:
-        mu: coefficient of friction.
-        h0: reference thickness of the membrane over its reference radius; 0 on the vertical side.
-        fillet: radius of the edge over the reference radius of the membrane; infinite on the vertical side.
+    It holds in contact with edge or side of the plug (`membrane_sliding_over_plug`). Lengths are over the reference
+    radius, tensions over 2 c10 h0; the side has h0 = 0 and an infinite fillet.
     """
     def derivatives(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)
@@ -326,12 +297,7 @@ def _free_derivatives(R: float, r: float, z: float, phi: float, t: float) -> lis
     .. math:: \frac{d\phi}{ds} = -\frac{T_2}{T_1} \frac{\sin\phi}{r}, \qquad
               \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r}, \qquad ds = \lambda_1 dR
 
-    Args:
-        R: reference radius over the reference radius of the membrane.
-        r: deformed radius over the same radius.
-        z: height over the same radius.
-        phi: slope, radians.
-        t: meridional tension T1 over 2 c10 h0.
+    Lengths are over the reference radius of the membrane, t is T1 over 2 c10 h0, and phi is in radians.
     """
     l1, t2 = _tensions(t, r / R)
     return [1, l1 * np.cos(phi), l1 * np.sin(phi), -l1 * t2 / t * np.sin(phi) / r, l1 * (t2 - t) * np.cos(phi) / r]

@@ -187,10 +187,7 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
     P_A and P_B are the pressures on the inner and outer face with the reference radii A and B. At the reference radius
     R the deformed radius is r, and b_theta and b_r are squared stretches. mu is the shear modulus.
 
-    Args:
-        ratio: inner over outer reference radius, A/B.
-        inner: deformed over reference inner radius.
-        stretch: axial stretch lambda.
+    `inner` is the deformed over the reference inner radius.
     """
     nodes, weights = np.polynomial.legendre.leggauss(60)
     R, w = ratio + (1 - ratio) * (nodes + 1) / 2, weights * (1 - ratio) / 2
@@ -208,12 +205,8 @@ def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) ->
     on the inner face. Each motion has three errors in the boundary conditions on the outer face, along r, theta and z.
     The errors form the determinant: a row for each condition, a column for each motion.
 
-    Args:
-        ratio: inner over outer reference radius.
-        inner: deformed over reference inner radius.
-        n: number of waves round the axis.
-        k: wave number along the axis times the outer reference radius.
-        outside: True if the fluid pressure acts on the outer face, False on the inner.
+    `inner` is the deformed over the reference inner radius; k is multiplied by the outer reference radius. `outside` is
+    the side of the fluid.
     """
     A, a = ratio, inner * ratio
     b = np.sqrt(a**2 + 1 - A**2)
@@ -242,10 +235,7 @@ def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) ->
         return np.append(np.array(found).T.ravel(), dbr - (bh - br) / r)
 
     def free(r, P):
-        """Return the boundary conditions on a face of radius r under a fluid pressure P, as rows, shape (3, 6).
-
-        Their products with the amplitudes (U, V, W, rr, rh, rz) of displacement and traction must vanish.
-        """
+        """Return rows (3, 6) of conditions at radius r under pressure P, for (U, V, W, rr, rh, rz)."""
         return np.array([[P / r, P * n / r, P * k, 1, 0, 0], [P * n / r, P / r, 0, 0, 1, 0], [P * k, 0, 0, 0, 0, 1]])
     start = np.hstack([np.eye(3), -free(a, P_in)[:, :3].T])         # tractions that follow from U, V, W
     p0 = state(a)[0] + P_in

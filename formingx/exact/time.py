@@ -194,12 +194,7 @@ class ThickBody:
         return float(self.weight(s)[0] @ self._difference(s, w))
 
     def _difference(self, s: float, w: np.ndarray) -> np.ndarray:
-        """Return the differences T of two principal Cauchy stresses at all points, shape (n,), stress.
-
-        In a wall they are the circumferential minus the radial stress, in a block the stress along the load minus the
-        stress in the stress-free direction. The degree of freedom is s, and w are the elastic strains of the branches,
-        shape (n, branches, 3).
-        """
+        """Return differences of principal stresses at all points, (n,), from s and elastic strains (n, branches, 3)."""
         l2 = np.exp(2 * self.strain(s)[0][:, None] * self.direction)
         m = np.exp(2 * w)
         return 2 * self.c10 * (l2[:, 0] - l2[:, 2]) + (m[..., 0] - m[..., 2]) @ self.mu
@@ -213,13 +208,7 @@ class ThickBody:
         return np.broadcast_to(self.strain(s)[1][:, None, None] * self.direction, self.w.shape).ravel()
 
     def _elastic_rate(self, s: float, ds: float, w: np.ndarray) -> np.ndarray:
-        """Return the time derivatives of the elastic strains w, as one array, shape (3 n branches,), 1/time.
-
-        Args:
-            s: degree of freedom.
-            ds: rate of the degree of freedom.
-            w: elastic strains at the n points, shape (n, branches, 3); the result has their order.
-        """
+        """Return the time derivatives, (3 n branches,), of the elastic strains w, (n, branches, 3); ds is that of s."""
         return self._strain_rate(s) * ds - self._relaxation_rate(w).ravel()
 
     def _relaxation_rate(self, w: np.ndarray) -> np.ndarray:
@@ -240,9 +229,7 @@ class ThickBody:
         T the stress difference; a prime is a derivative by s. Sums over k are over the branches, with the shear moduli
         mu_k and the elastic strains w. The rates at which these decrease by relaxation are rho.
 
-        Args:
-            s: degree of freedom.
-            w: elastic strains, shape (n, branches, 3).
+        The elastic strains have shape (n, branches, 3).
         """
         (e, de), (c, dc), d = self.strain(s), self.weight(s), self.direction
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
@@ -255,13 +242,7 @@ class ThickBody:
     def _integrate(self, rate: Callable, start: np.ndarray, times: Any) -> np.ndarray:
         """Return the solution of an initial value problem at n times, shape (n, k), and update the present time.
 
-        Args:
-            rate: function of (time, solution) that returns the time derivatives, shape (k,).
-            start: solution at the present time, shape (k,).
-            times: times in ascending order, shape (n,).
-
-        Raises:
-            InputError: the solution ends before the last time.
+        `rate` maps (time, solution) to derivatives, (k,). A solution that ends before the last time is an InputError.
         """
         from scipy.integrate import solve_ivp
         found = solve_ivp(rate, (self.time, times[-1]), start, method="DOP853", t_eval=times, **_TOLERANCES)

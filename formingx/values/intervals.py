@@ -19,17 +19,7 @@ def t_intervals(constants: Mapping[str, float], errors: Mapping[str, float], poi
 
     Here t is the quantile of Student's t distribution with n - m degrees of freedom, at least one.
 
-    Args:
-        constants: {constant: fitted value}.
-        errors: {constant: standard error}.
-        points: number of measured points.
-        confidence: confidence level, between 0 and 1.
-
-    Returns:
-        {constant: (lower end, upper end)}.
-
-    Raises:
-        InputError: the confidence level does not lie between 0 and 1.
+    The result is {constant: (lower end, upper end)}. A confidence level outside (0, 1) is an InputError.
     """
     from scipy.stats import t
     width = t.ppf((1 + fraction("intervals: confidence", confidence)) / 2, max(points - len(constants), 1))

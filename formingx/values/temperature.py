@@ -159,16 +159,9 @@ class Arrhenius:
 
 
 def _difference(shift: Any, temperature: Any, limit: float, what: str) -> Any:
-    """Return temperatures minus the lower limit of the range in which a shift factor is defined.
+    """Return temperatures (any shape or UFL) minus the lower limit of the range of a shift factor.
 
-    Args:
-        shift: the `WLF` or `Arrhenius`, for messages.
-        temperature: temperatures, numbers of shape (...) or a UFL expression.
-        limit: the lower limit, in the same unit.
-        what: name of the limit, for messages.
-
-    Raises:
-        InputError: a number is not above the limit.
+    A number that is not above the limit is an InputError, with the law and the name of the limit.
     """
     if isinstance(temperature, ufl.core.expr.Expr):
         return temperature - limit
