@@ -115,7 +115,7 @@ def resolution_of(points: np.ndarray, k: int | None) -> float:
 
 
 def _pairing_costs(points: np.ndarray, line: np.ndarray) -> np.ndarray:
-    """Return the least sums of squared distances of points (n, c) to ordered partners in samples (m, c), (n, m). """
+    """Return the least sums of squared distances of points (n, c) to ordered partners in samples (m, c), (n, m)."""
     cost = np.stack([((line - p) ** 2).sum(1) for p in points])
     for i in range(1, len(points)):
         cost[i] += np.minimum.accumulate(cost[i - 1])

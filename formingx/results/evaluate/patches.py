@@ -72,7 +72,7 @@ class Patches:
         return self._basis(slice(None), points) @ coefficients
 
     def _basis(self, chunk: slice, points: np.ndarray) -> np.ndarray:
-        """Return the ten monomials of a cubic at points (cells, ..., 2), shape (cells, ..., 10). """
+        """Return the ten monomials of a cubic at points (cells, ..., 2), shape (cells, ..., 10)."""
         between = (slice(None), *[None] * (points.ndim - 2))
         x = (points - self._origin[chunk][between]) / self._size[chunk][between]
         powers = np.stack([np.ones_like(x), x, x * x, x * x * x], axis=-1)        # (..., coordinate, power)

@@ -337,7 +337,7 @@ def _entry_name(scene: Any, item: Any) -> str:
 
 
 def work(path: Any) -> dict[str, np.ndarray]:
-    """Return the energy balance of a run, and log a warning if more than 0.5 % is unbalanced; collective. """
+    """Return the energy balance of a run, and log a warning if more than 0.5 % is unbalanced; collective."""
     found = balance(path)
     new = [finding for finding in findings(found) if finding not in path.record.findings]
     log_findings(new, path.problem.comm.rank)

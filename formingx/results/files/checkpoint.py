@@ -254,7 +254,7 @@ def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
 
 
 def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
-    """Return the n owned unknowns, shape (n,), from those of all cells, (cells, unknowns per cell). """
+    """Return the n owned unknowns, shape (n,), from those of all cells, (cells, unknowns per cell)."""
     numbers = space.mesh.topology.original_cell_index
     found = np.zeros(len(space.dofmap.list) and space.dofmap.list.max() + 1)
     found[space.dofmap.list] = values[numbers[:len(space.dofmap.list)]]

@@ -28,7 +28,7 @@ PILOT = "pilot"
 
 
 def begun(folder: Any) -> bool:
-    """Return True if a checkpoint holds a complete state; a folder of other files is an InputError. """
+    """Return True if a checkpoint holds a complete state; a folder of other files is an InputError."""
     folder = file_path("checkpoint", folder)
     if not folder.exists() or folder.is_dir() and all(entry.suffix == ".part" for entry in folder.iterdir()):
         return False

@@ -102,7 +102,7 @@ def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any
 
 
 def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
-    """Return {field: sum} over the quadrature points of a layer, with weights that differ by point; collective. """
+    """Return {field: sum} over the quadrature points of a layer, with weights that differ by point; collective."""
     sample = scene.sample(layer)
     numbers = np.sin(1.0 + scene.mesh.domain.topology.original_cell_index[sample.cells])
     weights = (numbers[:, None] * np.sin(1.0 + np.arange(len(sample.places)))).ravel()
