@@ -26,6 +26,8 @@ SHAPES = {
     "mirrored": tools.male(radius=2, height=3, fillet=0.5).mirrored().moved(z=5),
     "turned": tools.Tool([(1, 0), (3, 0.5), (2.5, 2), (1.2, 1.5)], fillets=[0.1, 0.2, 0.0, 0.3],
                          closed=True).turned(20),
+    "cup with a stacking step": tools.cup(radius=3, depth=6, draft=5, fillet=0.7, lip=0.4).with_piece(
+        [(3 - 1.5 * np.tan(np.radians(5)), 1.5), (3.4, 1.5), (3.4, 0)], [0.1, 0.2, 0.3]),
     "long": tools.Tool([(0.5 * k, 0.3 * (k % 2)) for k in range(40)], fillets=0.05),
 }
 
@@ -210,6 +212,40 @@ def test_gmsh_models(tmp_path, kind):
                                atol=1e-12)
     with pytest.raises(fx.InputError, match="curve 5 is neither a straight line nor a circular arc"):
         tools.read(file, [5])
+
+
+def bottle_with_rings(order):
+    """A bottle whose neck has two rings of a thread and whose base has a chime."""
+    mould = tools.bottle(radius=30.0, height=110.0, neck=12.0, shoulder=20.0, neck_height=20.0, fillet=5.0)
+    for z in (138.0, 144.0):
+        ring = [(12.0, z - 1.5), (13.2, z - 0.5), (13.2, z + 0.5), (12.0, z + 1.5)]
+        mould = mould.with_piece(ring[::order], [0.4, 0.3, 0.2, 0.1][::order])
+    return mould.with_piece([(22.0, 0.0), (20.0, 3.0), (0.0, 3.0)][::order], [1.0, 1.0, 0.0][::order])
+
+
+def test_pieces_are_added_to_a_profile():
+    """The bottle is the one whose corners were all given; the order of the points of a piece does not matter."""
+    rings = [p for z in (144.0, 138.0)
+             for p in ((12.0, z + 1.5), (13.2, z + 0.5), (13.2, z - 0.5), (12.0, z - 1.5))]
+    whole = tools.Tool([(12, 150), *rings, (12, 130), (30, 110), (30, 0), (22, 0), (20, 3), (0, 3)],
+                       [0, *[0.1, 0.2, 0.3, 0.4] * 2, 0, 0, 5, 1, 1, 0])
+    x = np.random.default_rng(7).uniform((0, -5), (35, 160), (400, 2))
+    for order in (1, -1):
+        built = bottle_with_rings(order)
+        assert built.signed_distance(x) == pytest.approx(whole.signed_distance(x), abs=1e-10)
+    assert np.ptp(whole.signed_distance(x) - tools.bottle(
+        radius=30.0, height=110.0, neck=12.0, shoulder=20.0, neck_height=20.0, fillet=5.0).signed_distance(x)) > 1
+
+
+@pytest.mark.parametrize("points, fillets, words", [
+    ([(31, 4), (32, 0)], 0, r"the point \(31, 4\) is on no line of the profile: the nearest one is \(30, 4\)"),
+    ([(30, 4)], 0, "give at least two points"), ([(30, 4), (32, 2), (30, 2)], [1, 1], "3 points and 2 fillets"),
+    ([(30, 4), (30, 4)], 0, "the first and the last point are the same"),
+    ([(30, 4), (32, 2), (30, 1)], 3, "too large for its corner"),
+    ([(30, 4), (-90, 2), (30, 1)], 0, "crosses itself")])
+def test_pieces_that_are_refused(points, fillets, words):
+    with pytest.raises(fx.InputError, match=words):
+        tools.cup(radius=30.0, depth=20.0).with_piece(points, fillets)
 
 
 def test_bounding_boxes_of_tools():

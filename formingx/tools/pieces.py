@@ -13,6 +13,9 @@ from ..values.tolerances import ROUND_OFF
 TURN = 2 * math.pi
 """Angle of a full circle, radians."""
 
+_ON_PROFILE = 1e-6
+"""Largest distance of a point that lies on a profile, over the size of the profile."""
+
 
 class Line(NamedTuple):
     """Straight piece of a profile.
@@ -119,6 +122,60 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
         if j in arcs:
             pieces.append(arcs[j])
     return pieces
+
+
+def with_polyline(pieces: tuple[Line | Arc, ...], points: np.ndarray, radii: list[float], size: float
+                  ) -> list[Line | Arc]:
+    """Return a profile whose part between two points on its lines is replaced by a polyline with fillets.
+
+    Args:
+        pieces: lines and arcs of the profile in order.
+        points: corners (R, Z) of the polyline, shape (n, 2), length; the first and the last lie on lines.
+        radii: fillet radius of each corner, length.
+        size: size of the profile, length.
+
+    Raises:
+        InputError: the first or the last point is not on a line, both are the same, or a fillet does not fit.
+    """
+    first, last = _lines_through(pieces, points[0], size), _lines_through(pieces, points[-1], size)
+    if first[0] > last[0]:
+        points, radii, first, last = points[::-1], radii[::-1], last, first
+    (i, _), (j, _) = first[0], last[-1]
+    if math.dist(points[0], points[-1]) <= ROUND_OFF * size:
+        raise InputError(f"Tool.with_piece: the first and the last point are the same, {text(points[0])}")
+    corners, begin, end = list(points), pieces[i].ends[0], pieces[j].ends[1]
+    if math.dist(begin, points[0]) > _ON_PROFILE * size:
+        corners, radii = [begin, *corners], [0.0, *radii]
+    if math.dist(end, points[-1]) > _ON_PROFILE * size:
+        corners, radii = [*corners, end], [*radii, 0.0]
+    return [*pieces[:i], *rounded(np.array(corners), radii, False, True), *pieces[j + 1:]]
+
+
+def _lines_through(pieces: tuple[Line | Arc, ...], point: np.ndarray, size: float) -> list[tuple[int, float]]:
+    """Return number and arc length of the lines of a profile on which a point lies.
+
+    Args:
+        pieces: lines and arcs of the profile in order.
+        point: the point (R, Z), shape (2,), length.
+        size: size of the profile, length.
+
+    Raises:
+        InputError: the point is on no line.
+    """
+    found, nearest = [], []
+    for k, piece in enumerate(pieces):
+        if isinstance(piece, Line):
+            length = math.dist(*piece.ends)
+            along = float(np.clip((point - piece.a) @ (piece.b - piece.a) / length, 0.0, length))
+            foot = piece.a + along / length * (piece.b - piece.a)
+            nearest.append((math.dist(foot, point), foot))
+            if nearest[-1][0] <= _ON_PROFILE * size:
+                found.append((k, along))
+    if not found:
+        near = min(nearest, key=lambda entry: entry[0], default=None)
+        raise InputError(f"Tool.with_piece: the point {text(point)} is on no line of the profile"
+                         + (f": the nearest one is {text(near[1])}" if near else ", which has arcs alone"))
+    return found
 
 
 def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn: float, first: bool,

@@ -17,7 +17,18 @@ from ..errors import InputError, as_list, as_points, check_type, finite, non_neg
 from ..mesh.boxes import overlapping
 from ..values.tolerances import ROUND_OFF
 from .nearest import nearest
-from .pieces import TURN, Arc, Line, checked, number_of_chords, rounded, sampled, text, turn_angle
+from .pieces import (
+    TURN,
+    Arc,
+    Line,
+    checked,
+    number_of_chords,
+    rounded,
+    sampled,
+    text,
+    turn_angle,
+    with_polyline,
+)
 
 
 class Nearest(NamedTuple):
@@ -191,6 +202,35 @@ class Tool:
     def reversed(self) -> Tool:
         """Return the tool whose solid lies on the other side of the same profile."""
         return self._with_pieces([p.reversed for p in reversed(self.pieces)])
+
+    def with_piece(self, points: Sequence[Sequence[float]], fillets: float | Sequence[float] = 0.0) -> Tool:
+        """Return the tool with a new piece of its profile: a stacking step, a ring of a thread, a chime.
+
+        The new lines replace the part of the profile between the first and the last point. Both lie on straight lines
+        of the profile, which the new fillets shorten. The order of the points does not matter.
+
+        Args:
+            points: corners (R, Z) of the new piece, shape (n, 2), length.
+            fillets: fillet radius of each corner, 0 for a sharp one, or one radius for all corners, length. A point
+                at an end of the profile has none.
+
+        Raises:
+            InputError: fewer than two points, or another number of fillets. The first or the last point is on no line,
+                a fillet is too large, or the profile crosses itself.
+
+        >>> mould = fx.tools.cup(radius=30.0, depth=20.0)
+        >>> step = mould.with_piece([(30.0, 4.0), (32.0, 4.0), (32.0, 0.0)], fillets=[0.3, 0.5, 0.0])
+        >>> step.signed_distance([(31.0, 3.0), (31.0, 5.0)]).round(6).tolist()          # below 0: outside
+        [-1.0, 1.0]
+        """
+        corners = np.array([pair("Tool.with_piece: points", p)
+                            for p in as_list("Tool.with_piece: points", points, "points (R, Z)")])
+        radii = list(np.asarray(fillets)) if np.ndim(fillets) > 0 else [fillets] * len(corners)
+        if len(corners) < 2 or len(radii) != len(corners):
+            raise InputError(f"Tool.with_piece: {len(corners)} points and {len(radii)} fillets: give at least two"
+                             f" points, and one fillet, or one for each point")
+        radii = [non_negative(f"Tool.with_piece: fillet at point {i}", r) for i, r in enumerate(radii)]
+        return self._with_pieces(with_polyline(self.pieces, corners, radii, self.size))
 
     def outline(self, per_arc: int = 24) -> np.ndarray:
         """Return points along the profile for drawing, shape (n, 2), length.
