@@ -35,6 +35,17 @@ const colours = async () => {
   return found;
 };
 
+// Places along the drawn section at which its wall has no colour: areas join all stations.
+const gaps = () => {
+  const plot = plotsOf("#section.js-plotly-plot")[0], found = [];
+  if (!plot) return found;
+  const texts = plot.data.filter(trace => trace.mode === "markers"), areas = plot.data.filter(trace =>
+    trace.fill === "toself" && trace.x.includes(null)).reduce((sum, trace) => sum + trace.x.filter(x => x === null).length, 0);
+  const stations = new Set(texts[0].text).size;
+  if (areas < texts.length * (stations - 1)) found.push(`${areas} areas of colour for ${stations} stations and ${texts.length} images`);
+  return found;
+};
+
 const move = () => {
   const slider = document.getElementById("slider");
   slider.value = +slider.value < 500 ? 1000 : 100;

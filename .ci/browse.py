@@ -126,6 +126,7 @@ def report_findings(browser: Chromium, file: Path) -> list[str]:
         colours = browser.evaluate("colours()")
         if not colours or min(colours) < 1:
             found.append(f"a plot is empty: colours {colours}")
+        found += browser.evaluate("gaps()")
         first = browser.evaluate("pictures()")
         if first:
             browser.evaluate("move()")

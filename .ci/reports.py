@@ -1,4 +1,4 @@
-"""Write the reports that `browse.py` opens: of a section with stages, of a tray and of a design."""
+"""Write the reports that `browse.py` opens: of a section with stages, of a tray, of a trough and of a design."""
 
 import re
 import sys
@@ -21,6 +21,11 @@ tray = fx.trace(fx.Scene(mesh=sheet, thickness=1.0, materials=fx.NeoHookean(c10=
                          supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")],
                          contacts=[fx.Contact("bottom", mould, name="mould")]), until=fx.pressure(0.05), progress=False)
 tray.report(out / "tray.html", units=units, density=1.05)
+
+trough = fx.trace(fx.Scene(mesh=fx.mesh.disc(radius=60, thickness=0.5, elements=(10, 1)), kinematics=fx.PlaneStrain(),
+                           materials=fx.NeoHookean(c10=0.4), supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")],
+                           loads=[fx.Pressure("bottom")]), until=fx.pole_height(50.0), progress=False)
+trough.report(out / "trough.html", units=units)
 
 
 def build(rim):

@@ -16,6 +16,7 @@ from formingx.problem.problem import Problem
 from formingx.results.files.checkpoint_data import contents
 from formingx.results.files.solid import solid
 from formingx.results.show import interactive
+from formingx.results.show.attempts import Attempts
 from formingx.results.show.report_data import of_checkpoint
 
 
@@ -45,6 +46,18 @@ def test_a_flat_sheet(inflated):
     assert part.variation < 1e-10 and part.scrap == 0
     assert part.weight == pytest.approx(0.93 * np.pi * R**2 * h, rel=1e-12)
     assert inflated.part(inflated.states[0], trim=0.7).volume == pytest.approx(np.pi * 0.7**2 * h, rel=1e-3)
+
+
+def test_a_bottle_is_trimmed_at_a_height():
+    """Height is the distance from the pole: a half ball, and a piece of the tube above it."""
+    mesh = fx.mesh.parison(inner_radius=2.0, thickness=0.4, length=8.0, elements=(24, 1))
+    scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
+                     loads=[fx.Pressure("inner")])
+    path = fx.solve(scene, to=1e-3, increments=1, progress=False)
+    part = path.part(path.states[0], trim=("height", 2.2 + 5.0))
+    assert part.volume == pytest.approx(np.pi * (2 / 3 * (2.4**3 - 2**3) + (2.4**2 - 2**2) * 5.0), rel=1e-3)
+    whole = path.part(path.states[0]).volume
+    assert part.scrap == pytest.approx(1 - part.volume / whole, rel=1e-6) and part.scrap > 0.2
 
 
 @pytest.mark.parametrize("length", ["mm", "cm", "in"])
@@ -335,7 +348,7 @@ def test_the_outline_of_a_block_bulges_as_its_rim(kinematics, tmp_path):
     assert np.all(np.unique(edges, axis=0, return_counts=True)[1] == 2)              # closed
     path.save(tmp_path / "run")
     drawn, = (run["sheet"] for run in json.loads(interactive.data(
-        [of_checkpoint(*contents(tmp_path / "run"))], ["run"], fx.Units()))["runs"])
+        [of_checkpoint(*contents(tmp_path / "run"))], ["run"], fx.Units(), Attempts()))["runs"])
     np.testing.assert_allclose(np.array(drawn["end"][-1]).T, profile.end, atol=1e-4)
 
 

@@ -7,8 +7,10 @@ from conftest import treloar
 import formingx as fx
 from formingx import findings
 from formingx.extensions.remeshing.earlier_meshes import _OutlineProjection
+from formingx.extensions.space import show
 from formingx.mesh.locate import locate
 from formingx.problem.problem import Problem
+from formingx.results.show import interactive, report, report_data, views
 
 
 def relaxing_disc(c10, both, duration):
@@ -71,3 +73,79 @@ def test_an_error_of_the_script_carries_the_path():
         fx.trace(treloar(), until=fx.pole_height(0.5), record={"mine": column}, progress=False)
     path = caught.value.path
     assert len(path) == 3 and path["pole_height"][-1] > 0 and "error.path" in caught.value.__notes__[0]
+
+
+@pytest.fixture(scope="module")
+def inflated():
+    return fx.trace(treloar(), until=fx.pole_height(0.2), progress=False)
+
+
+@pytest.mark.parametrize("module, name, told", [
+    (interactive, "_sheet", "the drawing of the section"), (interactive, "_walls", "the charts of the wall"),
+    (interactive, "_loading", "the curves of forces and pressures"),
+    (report, "_convergence", "the picture of convergence"),
+    (report, "_part", "the table of key numbers"), (report, "_states", "the table of states"),
+    (report_data, "tool_forces", "the curves of tool forces"), (report_data, "_fields_of", "colours of stress")])
+def test_a_part_of_a_report_that_fails_is_named_in_it(inflated, tmp_path, monkeypatch, module, name, told):
+    def careless(*_):
+        raise ZeroDivisionError("float division by zero")
+    monkeypatch.setattr(module, name, careless)
+    text = inflated.report(tmp_path / "run.html").read_text()
+    assert told in text and "could not be made and is left out: ZeroDivisionError: float division by zero" in text
+    assert "<h2>Inputs</h2>" in text and "<h2>Made with</h2>" in text
+
+
+def test_numbers_that_are_not_finite_lose_no_report(inflated, tmp_path, monkeypatch):
+    plain = interactive._walls
+    monkeypatch.setattr(interactive, "_walls", lambda *given: [
+        {**chart, "traces": [{**trace, "x": [float("nan")]} for trace in chart["traces"]]} for chart in plain(*given)])
+    text = inflated.report(tmp_path / "run.html").read_text()
+    assert "the charts of the wall could not be made" in text and "<h2>Made with</h2>" in text
+
+
+def test_the_report_explains_jumps(inflated):
+    record = report_data.of_path(inflated)
+    assert report.jumps(record) == ""
+    record.kinds[2], record.measures["pole_height"] = "jump", np.where(np.arange(len(inflated)) < 2, 0.0, 0.5)
+    text = report.jumps(record)
+    assert "The jump: what happened" in text and "pole height, by 100 % of its range" in text
+    assert text.count("<tr>") == 2
+
+
+@pytest.fixture(scope="module")
+def tray():
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(3.0, 2.0, part="quarter"), size=0.3)
+    scene = fx.Scene(mesh=sheet, thickness=0.02, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("bottom")],
+                     supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])
+    return fx.trace(scene, until=fx.displacement(0.3, at=(0, 0)), progress=False)
+
+
+def test_the_report_in_space_cuts_through_the_thinnest_place(tray, tmp_path, monkeypatch):
+    """Pictures that fail are named; the cut along the longer side meets the thinnest triangle."""
+    def careless(*_):
+        raise ZeroDivisionError("float division by zero")
+    monkeypatch.setattr(show, "view", careless)
+    text = tray.report(tmp_path / "tray.html", units=fx.Units("mm", "MPa")).read_text()
+    assert text.count("could not be made and is left out: ZeroDivisionError") == 2 and "<h2>Made with</h2>" in text
+    shape, along = show._cut(tray.wall(), fx.Units("mm", "MPa"))
+    wall = tray.wall()
+    (x,), (z,) = shape["traces"][1]["x"], shape["traces"][1]["y"]
+    thinnest = wall.middle[np.argmin(wall.wall)]
+    assert (x, z) == (thinnest[0], thinnest[2]) and f"y = {thinnest[1]:.4g} mm" in shape["title"]
+    assert min(np.hypot(*(np.column_stack([shape["traces"][0]["x"], shape["traces"][0]["y"]]) - (x, z)).T)) < 0.3
+    assert min(along["traces"][0]["y"]) == pytest.approx(wall.wall.min(), rel=0.05)
+    drawn = show._mesh(tray, report_data.of_path(tray), fx.Units())
+    assert [row[3] for row in drawn["thinnest"]][-1] == pytest.approx(wall.wall.min(), rel=1e-4)
+    assert len(drawn["thinnest"]) == len(drawn["points"])
+
+
+@pytest.mark.parametrize("plane, ends", [("axis", (-1.0, 1.0)), ("rim", (0.0, 2.0))])
+def test_a_half_in_plane_strain_is_drawn_with_one_image(plane, ends, tmp_path, monkeypatch):
+    other = {"axis": "rim", "rim": "axis"}[plane]
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(6, 1)), kinematics=fx.PlaneStrain(),
+                     materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry(plane, "x"), fx.Clamped(other)],
+                     loads=[fx.Pressure("bottom")])
+    path, drawn = fx.solve(scene, to=1e-4, increments=1, progress=False), []
+    monkeypatch.setattr(views, "_draw", lambda profile, *_: drawn.append(profile))
+    path.view3d(tmp_path / "half.png")
+    assert (drawn[0].bottom[:, 0].min(), drawn[0].bottom[:, 0].max()) == pytest.approx(ends, abs=1e-3)

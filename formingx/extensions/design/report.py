@@ -2,6 +2,7 @@
 
 import datetime
 import html
+from collections.abc import Callable
 from pathlib import Path as FilePath
 from typing import Any
 
@@ -12,6 +13,8 @@ from ...figures import figure, tools
 from ...findings import percent, without_notes
 from ...results import files
 from ...results.show import page, plots
+from ...results.show.attempts import Attempts
+from ...results.show.report import finding_element
 from ...units import Units
 from .scatter import covariance_of
 from .scatter import deviations as deviations_of
@@ -48,10 +51,10 @@ def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units)
     runs = page.table(["run", "unevenness", units.label("wall", "minimum wall"), units.label("wall", "mean wall"),
                        units.label("volume")], rows)
 
-    def pictures() -> list[str]:
-        """Return HTML elements with the pictures of the part, the walls, the profiles and the effects."""
-        return [_sections([before, best], ["before", "after"], units),
-                _walls(result, spread, deviations, units), _profiles(before, best), _heat_map(effects, units)]
+    pictures = {"the picture of the part": lambda: _sections([before, best], ["before", "after"], units),
+                "the picture of the walls": lambda: _walls(result, spread, deviations, units),
+                "the picture of the profiles": lambda: _profiles(before, best),
+                "the picture of the effects": lambda: _heat_map(effects, units)}
     sections = [*_uncertainties(best, deviations, units), "<h2>Runs of the search</h2>", runs]
     return _write(file, title or "Report of a design", summary, cards, notes, pictures,
                   _effects(best, effects, units, before), sections, best.path.problem.comm)
@@ -70,12 +73,15 @@ def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> Fi
              (f"{run.volume:.4g}", units.label("volume", "volume of the whole part at rest"))]
     notes = [("bad", found.text) for found in without_notes(run.path.findings())]
 
-    def pictures() -> list[str]:
-        """Return HTML elements with the pictures of the part, the wall and the effects."""
+    def wall_over_length() -> str:
+        """Return an HTML element with the picture of the wall."""
         drawing, axes = figure(1, width=9, height=4)
         _line(axes, run, "C0", "wall", spread, deviations, units)
-        return [_sections([run], ["the part"], units), page.figure(drawing, "Wall over the reference length."),
-                _heat_map(effects, units)]
+        return page.figure(drawing, "Wall over the reference length.")
+
+    pictures = {"the picture of the part": lambda: _sections([run], ["the part"], units),
+                "the picture of the wall": wall_over_length,
+                "the picture of the effects": lambda: _heat_map(effects, units)}
     return _write(file, title or "Report of a run", ["One run and what changes it."], cards, notes, pictures,
                   _effects(run, effects, units), _uncertainties(run, deviations, units), run.path.problem.comm)
 
@@ -85,22 +91,25 @@ def _units_of(run: Any, units: Units) -> Units:
     return units.per_depth() if run.path.scene.kinematics.dimension_of_volume == 2 else units
 
 
-def _write(file: Any, title: str, summary: list[str], cards: list, notes: list, pictures: Any, table: str,
-           sections: list[str], comm: Any) -> FilePath:
+def _write(file: Any, title: str, summary: list[str], cards: list, notes: list, pictures: dict[str, Callable[[], str]],
+           table: str, sections: list[str], comm: Any) -> FilePath:
     """Write the page of a report on rank 0, and return its path.
 
     Cards are (value, description) of large numbers, notes (kind, text) with the kind "bad" for warnings. `pictures`
-    returns HTML elements.
+    has functions that return HTML elements.
     """
     def make() -> None:
         """Draw the pictures and write the file."""
+        attempts = Attempts()
+        drawn = [attempts.make(name, draw, "") for name, draw in pictures.items()]
         body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{html.escape(' '.join(summary))}</p>"]
         body += [f"<div class='note{' bad' * (kind == 'bad')}'>{page.lines(text)}</div>"
                  for kind, text in notes if text]
         body.append("<div class=cards>" + "".join(
             f"<div class=card><b>{html.escape(value)}</b><span>{html.escape(what)}</span></div>"
             for value, what in cards) + "</div>")
-        body += [*pictures(), "<h2>Parameters and their effects</h2>", table, *sections, "<h2>Made with</h2>"]
+        body += [*map(finding_element, attempts.findings), *drawn, "<h2>Parameters and their effects</h2>", table,
+                 *sections, "<h2>Made with</h2>"]
         body += [page.table(
             ["", ""], [["date", datetime.datetime.now().astimezone().strftime("%Y-%m-%d %H:%M %Z")],
                        *([k, str(v)] for k, v in files.versions().items())])]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html
+from functools import partial
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -14,8 +15,9 @@ from ...errors import InputError
 from ...mesh.edges import edges_of
 from ...results import files
 from ...results.show import interactive, page
+from ...results.show.attempts import Attempts
 from ...results.show.interactive import rounded
-from ...results.show.report import PROCESS, finding_element, introduction, scripts, versions
+from ...results.show.report import PROCESS, finding_element, introduction, jumps, scripts, versions
 from ...results.show.report_data import of_path
 from ...results.show.views import look, plotted, shading
 from ...scene.summary import summary
@@ -127,9 +129,11 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     from .part import part
     wall, last, comm = path.wall(), path.last, path.problem.comm
     planes, record = path.scene.symmetry, of_path(path)
-    found = part(wall, density, trim, (), units, planes)
+    found, attempts = part(wall, density, trim, (), units, planes), Attempts(InputError, ImportError)
     record.drawn = int(np.clip(_DRAWN // len(wall.reference_points), *_FRAMES))
-    drawn = interactive.data([record], [title or "run"], units, {"mesh": _mesh(path, record, units)})
+    surfaces = attempts.make("the drawing of the body", lambda: {"mesh": _mesh(path, record, units)}, {})
+    cut: list[dict[str, Any]] = attempts.make("the cut", lambda: _cut(wall, units), [])
+    drawn = interactive.data([record], [title or "run"], units, attempts, surfaces, cut)
     size = np.ptp(wall.reference_points, axis=0).max() / 12
     pictures: list[str] = []
     with TemporaryDirectory() as folder:
@@ -137,16 +141,17 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
                               ("Squares that were printed on the body.", size)):
             target = FilePath(folder) / "picture.png"
             try:
-                view(path, last, target, grid)
+                attempts.make(f"the picture {caption[:-1]!r}", partial(view, path, last, target, grid), None)
             except (InputError, ImportError) as error:
                 pictures = [f"<p class=note>No pictures: {html.escape(str(error))}.</p>"]
                 break
-            if comm.rank == 0:
+            if comm.rank == 0 and target.exists():
                 pictures.append(page.picture(target.read_bytes(), caption, "wide"))
+                target.unlink()
     body = [f"<h1>{html.escape(title or 'Report of a run')}</h1>", f"<p class=lead>{introduction(record, units)}</p>"]
     if failure is not None:
         body.append(f"<div class='note bad'><h2>The run could not go on</h2><p>{page.lines(str(failure))}</p></div>")
-    body += map(finding_element, path.findings())
+    body += map(finding_element, [*record.findings, *attempts.findings])
     body += [PROCESS, "<div class=grid>", *pictures, "</div><h2>Key numbers</h2>",
              page.table(["", ""], [list(row) for row in found.rows]), "<h2>Curves</h2><div id=charts class=grid></div>"]
     names = list(dict.fromkeys(state.stage for state in path.states))
@@ -154,7 +159,8 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     ends = [next(s for s in reversed(path.states) if s.stage == name) for name in names]
     body += ["<h2>Stages</h2>", page.table(["stage", *(units.label(c) for c in columns)], [
         [state.stage or "run", *(page.number(state.measures[c]) for c in columns)] for state in ends])]
-    body += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()]),
+    body += [jumps(record), "<h2>Inputs</h2>",
+             page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()]),
              "<h2>Made with</h2>", page.table(["", ""], versions([record]))]
 
     def make() -> None:
@@ -163,6 +169,32 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
         files.replace(file, lambda stream: stream.write(text))
     files.on_root(comm, make)
     return FilePath(file)
+
+
+def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
+    """Return two charts of the cut through the thinnest triangle along the longer side of the part.
+
+    The first has the shape of the cut, the second the wall along it.
+
+    Args:
+        wall: the wall in the last state (`SheetWall`).
+        units: units of the labels.
+    """
+    thinnest = wall.middle[int(np.argmin(wall.wall))]
+    axis = int(np.argmax(np.ptp(wall.deformed_points[:, :2], axis=0)))
+    normal = np.eye(3)[1 - axis]
+    cut = wall.section(tuple(thinnest), tuple(normal))
+    along, across = "xy"[axis], "xy"[1 - axis]
+    place = f"{across} = {thinnest[1 - axis]:.4g}{f' {units.length}' if units.length else ''}"
+    shape = {"x": rounded(cut[along]), "y": rounded(cut["z"]), "name": "cut", "mode": "lines"}
+    mark = {"x": [float(thinnest[axis])], "y": [float(thinnest[2])], "name": "thinnest place", "mode": "markers",
+            "marker": {"size": 9, "color": "#d03030", "symbol": "diamond"}}
+    line = {"x": rounded(cut["arc_length"]), "y": rounded(cut["wall"]), "name": "wall", "mode": "lines"}
+    charts = (interactive.chart(f"Cut at {place}, through the thinnest place", units.label("arc_length", along),
+                                units.label("arc_length", "z"), [shape, mark], equal=True),
+              interactive.chart(f"Wall along the cut at {place}", units.label("arc_length"), units.label("wall"),
+                                [line], zero="y"))
+    return [chart for chart in charts if chart]
 
 
 def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
@@ -181,5 +213,7 @@ def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
         images = [[*scale, *shift] for scale, shift in record.planes.images(3, contact.tool.bounds)]
         tools.append({"name": name, "points": rounded(points.T), "triangles": triangles.T.tolist(), "images": images,
                       "moves": contact.travel_vector.tolist(), "travel": [record.travels[i][k] for i in record.frames]})
-    return {"triangles": walls[0].triangles.T.tolist(), "points": [rounded(wall.deformed_points.T) for wall in walls],
+    thinnest = [int(np.argmin(wall.wall)) for wall in walls]
+    return {"thinnest": [rounded([*wall.middle[k], wall.wall[k]], each=True) for wall, k in zip(walls, thinnest)],
+            "triangles": walls[0].triangles.T.tolist(), "points": [rounded(wall.deformed_points.T) for wall in walls],
             "fields": {name: [rounded(values) for values in each] for name, each in shown.items()}, "tools": tools}

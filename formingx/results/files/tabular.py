@@ -73,13 +73,13 @@ def versions() -> dict[str, str]:
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:
     """Call a function on rank 0 alone, and return its result on all ranks; collective.
 
-    Its OSError, ValueError or ImportError is raised on all ranks.
+    An error of the function is raised on all ranks.
     """
     result, error = None, None
     if comm.rank == 0:
         try:
             result = action()
-        except (OSError, ValueError, ImportError) as found:
+        except Exception as found:
             error = found
     if comm.size > 1:                                       # (alone, a message would be a copy)
         result, error = comm.bcast((result, error), root=0)

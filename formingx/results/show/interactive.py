@@ -4,6 +4,8 @@ import base64
 import functools
 import gzip
 import json
+from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import resources
 from pathlib import Path
 from typing import Any
@@ -12,6 +14,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...units import Units
+from .attempts import Attempts
 from .report_data import FRAMES, ReportData, words
 
 DIGITS = 5
@@ -39,16 +42,36 @@ def packed(text: str) -> str:
     return base64.b64encode(gzip.compress(text.encode(), 4, mtime=0)).decode()
 
 
-def data(records: list[ReportData], names: list[str], units: Units, extra: dict[str, Any] | None = None) -> str:
-    """Return all data that `report.js` draws, as JSON text; `extra` has further entries of each run."""
-    runs = [_run(record, name, units) | (extra or {}) for record, name in zip(records, names)]
-    charts = [chart for chart in (*_loading(records, names, units), *_in_time(records, names, units),
-                                  _filling(records, names, units), *_walls(records, names, units)) if chart]
-    return json.dumps({"runs": runs, "charts": charts, "length": units.length or ""}, allow_nan=False,
+def data(records: list[ReportData], names: list[str], units: Units, attempts: Attempts,
+         extra: dict[str, Any] | None = None, charts: Sequence[dict[str, Any]] = ()) -> str:
+    """Return all data that `report.js` draws, as JSON text.
+
+    `extra` has further entries of each run, `charts` are drawn before the others. Drawings that fail are left out.
+    """
+    runs = [_run(record, name, units, attempts) | (extra or {}) for record, name in zip(records, names)]
+    kinds: list[tuple[str, Callable[[], list]]] = [
+        ("the curves of forces and pressures", lambda: _loading(records, names, units)),
+        ("the curves over time", lambda: _in_time(records, names, units)),
+        ("the chart of corners", lambda: [_filling(records, names, units)]),
+        ("the charts of the wall", lambda: _walls(records, names, units))]
+    found = [one for name, draw in kinds for one in attempts.make(name, partial(_finite_of, draw), [])]
+    drawn = [one for one in (*charts, *found) if one]
+    return json.dumps({"runs": runs, "charts": drawn, "length": units.length or ""}, allow_nan=False,
                       separators=(",", ":"))
 
 
-def _run(record: ReportData, name: str, units: Units) -> dict[str, Any]:
+def _finite_of(draw: Callable[[], Any]) -> Any:
+    """Return the data of a drawing that a function makes.
+
+    Raises:
+        ValueError: a number is not finite.
+    """
+    content = draw()
+    json.dumps(content, allow_nan=False)
+    return content
+
+
+def _run(record: ReportData, name: str, units: Units, attempts: Attempts) -> dict[str, Any]:
     """Return the data of one run for `report.js` as a dictionary.
 
     It holds the stages, and for each drawn state the main columns, the tools and the sheet.
@@ -61,9 +84,10 @@ def _run(record: ReportData, name: str, units: Units) -> dict[str, Any]:
              "stage": [record.stages[k] for k in frames],
              "numbers": {units.label(c): rounded(record.measures[c][frames]) for c in shown},
              "images": [[*scale, *shift] for scale, shift in record.planes.images(3 if record.space else 2)],
-             "tools": _tools(record), "sheet": None}
+             "sheet": None, "tools": attempts.make("the drawing of the tools", partial(_tools, record), [])}
     if record.profiles[-1] is not None:
-        found["sheet"] = _sheet(record, units)
+        draw = partial(_finite_of, partial(_sheet, record, units))
+        found["sheet"] = attempts.make("the drawing of the section", draw, None)
     return found
 
 
@@ -137,7 +161,7 @@ def _loading(records: list[ReportData], names: list[str], units: Units) -> list[
             for x, y, xs, ys in _driven(record, of_stage):
                 label = " ".join(w for w in (name if len(records) > 1 else "", words(record.stages[a])) if w)
                 pairs.setdefault((x, y), []).append(_trace(xs, ys, label or words(y)))
-    drawn = [_chart(f"{words(y).capitalize()} against {words(x)}", units.label(x), units.label(y), traces)
+    drawn = [chart(f"{words(y).capitalize()} against {words(x)}", units.label(x), units.label(y), traces)
              for (x, y), traces in pairs.items()]
     return [chart for chart in drawn if chart]
 
@@ -189,7 +213,7 @@ def _in_time(records: list[ReportData], names: list[str], units: Units) -> list[
             values = np.array([reduce(record.fields[k]["temperature"]) for k in warm])
             drawn.setdefault("Temperature", (_label(record, units, "temperature"), []))[1].append(
                 _trace(time[warm], values, lead + which))
-    return [_chart(f"{kind} over time", units.label("process_time"), label, traces)
+    return [chart(f"{kind} over time", units.label("process_time"), label, traces)
             for kind, (label, traces) in drawn.items()]
 
 
@@ -214,7 +238,7 @@ def _filling(records: list[ReportData], names: list[str], units: Units) -> dict[
         drawn = [k for k in record.shown if timed or record.stages[k] == record.stages[-1]]
         for label, gaps in record.gaps(drawn).items():
             traces.append(_trace(abscissa[drawn], gaps, f"{name}: {label}" if len(records) > 1 else label))
-    return _chart("Gap left in the corners " + ("over time" if timed else "against pressure"),
+    return chart("Gap left in the corners " + ("over time" if timed else "against pressure"),
                   units.label("process_time" if timed else "pressure"), units.label("gap"), traces)
 
 
@@ -238,19 +262,19 @@ def _walls(records: list[ReportData], names: list[str], units: Units) -> list[di
             by_height.append({"x": rounded(values), "y": rounded(wall.height), "name": label, "mode": "lines"})
             by_length.append({"x": rounded(wall.arc_length), "y": rounded(values), "name": label, "mode": "lines"})
     label = units.label("wall")
-    return [_chart("Wall against height (distance in z from the pole, or from the lowest point)", label,
+    return [chart("Wall against height (distance in z from the pole, or from the lowest point)", label,
                    units.label("height"), by_height, zero="x"),
-            _chart("Wall against arc length from the axis", units.label("arc_length"), label, by_length, zero="y")]
+            chart("Wall against arc length from the axis", units.label("arc_length"), label, by_length, zero="y")]
 
 
-def _chart(title: str, x: str, y: str, traces: list[dict], zero: str = "") -> dict[str, Any] | None:
+def chart(title: str, x: str, y: str, traces: list[dict], zero: str = "", equal: bool = False) -> dict[str, Any] | None:
     """Return a chart as data for `report.js`; None without curves.
 
-    "x" or "y" in `zero` makes that axis begin at 0.
+    "x" or "y" in `zero` makes that axis begin at 0; with `equal` both axes have the same scale.
     """
     if not traces:
         return None
-    return {"title": title, "x": x, "y": y, "zero": zero,
+    return {"title": title, "x": x, "y": y, "zero": zero, **({"equal": True} if equal else {}),
             "traces": [{"type": "scatter", **trace} for trace in traces]}
 
 

@@ -26,7 +26,7 @@ function frame(run, s, field) {
   const {k, j, f} = place(run, s), sheet = run.sheet || run.mesh, values = sheet.fields[field];
   const line = of => (sheet[of] ? sheet[of][k] : []).map((v, i) => mix(v, sheet[of][j][i], f));
   const between = (a, b) => f < 1 && a !== null && b !== null ? a + f * (b - a) : f < 1 ? a : b;
-  return {bottom: line("bottom"), top: line("top"), start: line("start"), end: line("end"), points: line("points"), values: mix(values[k], values[j], f),
+  return {state: f < 1 ? k : j, bottom: line("bottom"), top: line("top"), start: line("start"), end: line("end"), points: line("points"), values: mix(values[k], values[j], f),
     moved: (sheet.tools || []).map(tool => between(tool.travel[k], tool.travel[j])),
     all: Object.fromEntries(Object.entries(sheet.fields).map(([name, v]) => [name, mix(v[k], v[j], f)])),
     numbers: Object.fromEntries(Object.entries(run.numbers).map(([n, v]) => [n, v[k] + f * (v[j] - v[k])])),
@@ -60,6 +60,36 @@ function through(run, at, axis, s) {
   return mix(at.bottom[axis], at.top[axis], s).map((v, i) => v + near[i] * first + far[i] * other);
 }
 
+const VIRIDIS = ["#440154", "#48186a", "#472d7b", "#424086", "#3b528b", "#33638d", "#2c728e", "#26828e", "#21918c", "#1fa088", "#28ae80",
+  "#3fbc73", "#5ec962", "#84d44b", "#addc30", "#d8e219", "#fde725"], PORTLAND = ["#0c3383", "#0a88ba", "#f2d338", "#f28f38", "#d91e1e"], HUES = 32;
+const colours = field => field.startsWith("temperature") ? PORTLAND : field.startsWith("wall") ? [...VIRIDIS].reverse() : VIRIDIS;
+function hue(scale, share) {                                               // share: 0 to 1
+  const x = share * (scale.length - 1), k = Math.min(Math.floor(x), scale.length - 2);
+  const [a, b] = [scale[k], scale[k + 1]].map(c => [1, 3, 5].map(i => parseInt(c.slice(i, i + 2), 16)));
+  return `rgb(${mix(a, b, x - k).map(Math.round).join(",")})`;
+}
+
+// The wall as closed areas, one between each two stations, of HUES colours; areas of one colour are one trace.
+function bands(run, at, field, range, rows, sides) {
+  const inner = [0, 1].map(axis => Array.from({length: rows - 1}, (_, k) => through(run, at, axis, (k + 1) / rows)));
+  const across = (axis, i) => [at.bottom[axis][i], ...inner[axis].map(level => level[i]), at.top[axis][i]];
+  const last = at.bottom[0].length - 1, areas = Array.from({length: HUES}, () => [[], []]);
+  for (let i = 0; i < last; i++) {
+    if (at.values[i] === null || at.values[i + 1] === null) continue;
+    const share = ((at.values[i] + at.values[i + 1]) / 2 - range[0]) / ((range[1] - range[0]) || 1);
+    const area = areas[Math.min(Math.max(Math.floor(HUES * share), 0), HUES - 1)];
+    for (const axis of [0, 1]) {
+      const from = i === 0 && at.start[axis].length ? at.start[axis] : across(axis, i);
+      const to = i === last - 1 && at.end[axis].length ? at.end[axis] : across(axis, i + 1);
+      area[axis].push(...from, ...[...to].reverse(), from[0], null);
+    }
+  }
+  const scale = colours(field), moved = (map, v) => { const all = map(v); return all.map((x, i) => v[i] === null ? null : x); };
+  return areas.flatMap((area, k) => area[0].length ? [{type: "scatter", mode: "lines", fill: "toself", hoverinfo: "skip", showlegend: false,
+    fillcolor: hue(scale, (k + 0.5) / HUES), line: {color: hue(scale, (k + 0.5) / HUES), width: 2},
+    x: sides.flatMap(([right]) => moved(right, area[0])), y: sides.flatMap(([, up]) => moved(up, area[1]))}] : []);
+}
+
 function sectionTraces(run, at, field, range) {
   const sides = maps(run), traces = [];
   run.tools.forEach((tool, i) => sides.forEach(([across, up]) => {
@@ -72,20 +102,17 @@ function sectionTraces(run, at, field, range) {
   sides.forEach(([across, up]) => traces.push({type: "scatter", mode: "lines", fill: "toself", fillcolor: "#30405a",
     line: {color: "#30405a", width: 0.5}, hoverinfo: "skip", showlegend: false,
     x: across(around(at, 0)), y: up(around(at, 1))}));
-  const [bottom, top] = [at.bottom, at.top], stations = bottom[0].length, size = Math.max(...box(run).map(([a, b]) => b - a));
+  const [bottom, top] = [at.bottom, at.top], size = Math.max(...box(run).map(([a, b]) => b - a));
   const wall = Math.max(...bottom[0].map((r, i) => Math.hypot(top[0][i] - r, top[1][i] - bottom[1][i])));
-  const rows = Math.min(Math.max(Math.ceil(wall / (0.0125 * size)), 1), 20);                // of dots through the wall
-  const length = bottom[0].reduce((sum, r, i) => i ? sum + Math.hypot(r - bottom[0][i - 1], bottom[1][i] - bottom[1][i - 1]) : 0, 0);
-  const parts = rows > 1 ? Math.min(Math.ceil(length / (0.005 * size * stations)), 6) : 6;  // between two stations
-  const dense = v => v.flatMap((a, i) => i + 1 < stations
-    ? Array.from({length: parts}, (_, k) => a === null ? a : a + k / parts * ((v[i + 1] ?? a) - a)) : [a]);
+  const rows = Math.min(Math.max(Math.ceil(wall / (0.0125 * size)), 1), 20);                // of points through the wall
+  traces.push(...bands(run, at, field, range, rows, sides));
   const all = list => Array.from({length: rows}, (_, k) => list((k + 0.5) / rows)).flat();
-  const [r, z] = [0, 1].map(axis => all(s => dense(through(run, at, axis, s))));
+  const [r, z] = [0, 1].map(axis => all(s => through(run, at, axis, s)));
   sides.forEach(([across, up], n) => traces.push({type: "scatter", mode: "markers", showlegend: false, hovertemplate: "%{text}<extra></extra>",
-    x: across(r), y: up(z),
-    text: all(() => dense(bottom[0]).map((_, k) => Math.round(k / parts))).map(i => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
-      Object.entries(at.all).map(([label, v]) => stated(label, v[i])).join("<br>")),
-    marker: {size: 6, color: all(() => dense(at.values)), colorscale: field.startsWith("temperature") ? "Portland" : "Viridis", reversescale: field.startsWith("wall"), cmin: range[0],
+    x: across(r), y: up(z), opacity: 0,                                                     // they carry texts and the colour bar
+    text: all(() => bottom[0].map((_, i) => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
+      Object.entries(at.all).map(([label, v]) => stated(label, v[i])).join("<br>"))),
+    marker: {size: 6, color: all(() => at.values), colorscale: colours(field).map((c, k, scale) => [k / (scale.length - 1), c]), cmin: range[0],
       cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0, exponentformat: "power",
       title: {text: narrow() ? "" : field, side: "right"}, ...(narrow() ? {orientation: "h", yref: "container", y: 0, yanchor: "bottom", len: 1} : {})}}}));
   return traces;
@@ -106,7 +133,10 @@ function mesh(run, at, field, range) {
     return {type: "mesh3d", ...image(points, map), i: tool.triangles[0], j: tool.triangles[1], k: tool.triangles[2], color: GREY,
       opacity: 0.25, hoverinfo: "name", name: tool.name, visible: at.moved[n] !== null};
   }));
-  return [...tools, ...sheets];
+  const [x, y, z, thin] = run.mesh.thinnest[at.state], label = Object.keys(run.mesh.fields)[0];
+  const marks = run.images.map(map => ({type: "scatter3d", mode: "markers", ...image([[x], [y], [z]], map), showlegend: false,
+    marker: {size: 5, color: "#d03030", symbol: "diamond"}, hovertemplate: `thinnest: ${stated(label, thin)}<extra></extra>`}));
+  return [...tools, ...sheets, ...marks];
 }
 
 function surface(run, at, field, range) {
@@ -202,7 +232,7 @@ function charts(data) {
     caption.textContent = chart.title; figure.append(caption, plot); element("charts").append(figure);
     const axis = (title, zero) => ({title: {text: title, standoff: 8}, automargin: true, ...plain, ...(zero ? {rangemode: "tozero"} : {})});
     Plotly.newPlot(plot, chart.traces, {font, height: 330, margin: {l: 60, r: 10, t: 28, b: 45}, plot_bgcolor: "white",
-      xaxis: axis(chart.x, chart.zero === "x"), yaxis: axis(chart.y, chart.zero === "y"),
+      xaxis: axis(chart.x, chart.zero === "x"), yaxis: {...axis(chart.y, chart.zero === "y"), ...(chart.equal ? {scaleanchor: "x"} : {})},
       showlegend: chart.traces.length > 1, legend: {orientation: "h", y: -0.3}}, config);
   });
 }

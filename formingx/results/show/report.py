@@ -19,12 +19,13 @@ import numpy as np
 from mpi4py import MPI
 
 from ...errors import InputError, as_list
-from ...findings import Finding
+from ...findings import Finding, percent
 from ...units import NONE, Units
 from .. import files
 from ..evaluate.part import Part, part
 from ..evaluate.wall import Wall
 from . import interactive, page
+from .attempts import Attempts
 from .report_data import CONTROLS, ReportData, of_checkpoint, of_path, words
 
 
@@ -76,8 +77,10 @@ def write(records: ReportData | list[ReportData], file: Any, title: str, failure
     units = units.per_depth() if all(record.per_depth for record in records) else units
 
     def make():
-        parts = [_part(record, units, density, trim) for record in records]
-        text = _page(records, names, parts, title or "Report of a run", failure, units)
+        refusing = Attempts(InputError)
+        parts = [refusing.make("the table of key numbers", lambda record=record: _part(record, units, density, trim),
+                               None) for record in records]
+        text = _page(records, names, parts, title or "Report of a run", failure, units, refusing.findings)
         files.replace(file, lambda stream: stream.write(text))
     files.on_root(comm, make)
     return FilePath(file)
@@ -97,26 +100,32 @@ def _part(record: ReportData, units: Units, density: float | None, trim: Any) ->
                 record.planes)
 
 
-def _page(records: list[ReportData], names: list[str], parts: list, title: str, failure: Any, units: Units) -> str:
+def _page(records: list[ReportData], names: list[str], parts: list, title: str, failure: Any, units: Units,
+          findings: list[Finding]) -> str:
     """Return the report as an HTML page.
 
-    `parts` has for each run its `Part` or None; `failure` is the error that ended the run, or None.
+    `parts` has for each run its `Part` or None; `failure` is the error that ended the run, or None. `findings` are on
+    parts of the report that failed.
     """
-    alone = len(records) == 1
+    alone, attempts = len(records) == 1, Attempts()
     body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{introduction(records[0], units)}</p>"]
     for record, name in zip(records, names):
-        body += _trouble(failure or record.failure, "" if alone else f"{name}: ")
+        body += _trouble(failure or record.failure, "" if alone else f"{name}: ", attempts)
     body += [_warnings(record, "" if alone else f"{name}: ") for record, name in zip(records, names)]
+    place = len(body)
     body.append(PROCESS)
     if alone:
-        body.append(_cards(records[0], parts[0], units))
-    body += ["<h2>Key numbers</h2>", _answers(records, names, parts, units),
+        body.append(attempts.make("the main numbers", lambda: _cards(records[0], parts[0], units), ""))
+    body += ["<h2>Key numbers</h2>", attempts.make(
+        "the table of key numbers", lambda: _answers(records, names, parts, units), ""),
              "<h2>Curves</h2><div id=charts class=grid></div>"]
     for record, name in zip(records, names):
         body += [] if alone else [f"<h2>{html.escape(name)}</h2>"]
-        body += _details(record, units)
+        body += _details(record, units, attempts)
     body += ["<h2>Made with</h2>", page.table(["", ""], versions(records))]
-    return page.page(title, body, scripts(interactive.data(records, names, units)))
+    drawn = interactive.data(records, names, units, attempts)
+    body[place:place] = map(finding_element, [*findings, *attempts.findings])
+    return page.page(title, body, scripts(drawn))
 
 
 def scripts(data: str) -> str:
@@ -139,34 +148,39 @@ and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothin
 <div class=views><div id=section></div><div id=solid></div></div></div>"""
 
 
-def _trouble(failure: Any, lead: str) -> list[str]:
-    """Return the error message of a failed run as HTML, with a picture of its last admissible state.
-
-    `lead` is the text before the heading, such as the name of the run.
+    `lead` is the text before the heading, such as the name of the run. `attempts` collects the error of a picture.
     """
     if not failure:
         return []
     found = [f"<div class='note bad'><h2>{html.escape(lead)}The run could not go on</h2>"
              f"<p>{page.lines(str(failure))}</p></div>"]
-    shape = _drawn(lambda file: failure.diagnosis.picture(file)) if getattr(failure, "diagnosis", None) else None
+    shape = attempts.make("the picture of the last good state", lambda: _drawn(failure.diagnosis.picture), None
+                          ) if getattr(failure, "diagnosis", None) else None
     return found + ([page.picture(shape, "The last good state, its elements coloured by J.", "small")] if shape else [])
 
 
-def _details(record: ReportData, units: Units) -> list[str]:
+def _details(record: ReportData, units: Units, attempts: Attempts) -> list[str]:
     """Return the page's sections below the curves: stages, tools, inputs, output quantities, convergence and states."""
+    def table(name: str, make: Callable[[ReportData, Units], str]) -> str:
+        """Return a table of the run as HTML, or "" if it fails; name: name for the finding."""
+        return attempts.make(name, lambda: make(record, units), "")
+
     found = []
     if any(record.stages):
-        found += ["<h2>Stages</h2>", _stages(record, units)]
+        found += ["<h2>Stages</h2>", table("the table of stages", _stages)]
     if record.tooling.contacts:
-        found += ["<h2>Tools</h2>", _tools(record, units)]
+        found += ["<h2>Tools</h2>", table("the table of tools", _tools)]
+    found.append(attempts.make("the table of jumps", lambda: jumps(record), ""))
     found += ["<h2>Inputs</h2>", page.table(["", ""], [[k, v] for k, v in record.summary.items()])]
-    found.append(page.details("All output quantities at limit points and at the end", _key_numbers(record, units)))
+    found.append(page.details("All output quantities at limit points and at the end",
+                              table("the table of output quantities", _key_numbers)))
     if record.limits:
         found.append("<p>Reasons for shorter or failed steps: " + html.escape(", ".join(
             f"{reason} ({times} times)" for reason, times in record.limits.items())) + ".</p>")
-    found.append(page.details("Convergence", _convergence(record) + _iterations(record, units)))
+    found.append(page.details("Convergence", attempts.make("the picture of convergence", lambda: _convergence(record),
+                                                           "") + table("the table of iterations", _iterations)))
     shown = "States that are drawn" if len(record.frames) < len(record.kinds) else "All states"
-    found.append(page.details(shown, _states(record, units)))
+    found.append(page.details(shown, table("the table of states", _states)))
     return found
 
 
@@ -289,6 +303,27 @@ def _stages(record: ReportData, units: Units) -> str:
     return page.table(["stage", "states", "iterations of accepted steps",
                        *(units.label(c, f"{words(c)} at its end") for c in columns), *extra,
                        units.label("gap", "largest gap in a corner"), "smallest wall / original thickness"], rows)
+
+
+def jumps(record: ReportData) -> str:
+    """Return an HTML explanation of the jumps of a run, with a row for each; "" without any."""
+    columns = [c for c in record.measures if not c.endswith(("error", "process_time"))]
+    ranges = {c: float(np.ptp(record.measures[c])) for c in columns}
+    rows = []
+    for k, kind in enumerate(record.kinds):
+        if kind == "jump" and k:
+            changes = {c: abs(float(record.measures[c][k] - record.measures[c][k - 1])) / ranges[c]
+                       for c in columns if ranges[c] > 0}
+            column = max(changes, key=lambda c: changes[c], default="")
+            rows.append([str(k), words(record.stages[k]), record.control_text(k),
+                         f"{words(column)}, by {percent(changes[column])} of its range" if column else ""])
+    if not rows:
+        return ""
+    text = ("In a jump the control is constant, and the body moves to its next equilibrium, because none is near. A"
+            " sheet snaps so past a limit point. In contact, points that leave a tool or slide off an edge cause jumps,"
+            " which are small. The last column says how far each jump went in the run.")
+    return page.details(f"{'The jump' if len(rows) == 1 else f'The {len(rows)} jumps'}: what happened, and where",
+                        f"<p>{text}</p>" + page.table(["state", "stage", "control", "largest change"], rows))
 
 
 def _tools(record: ReportData, units: Units) -> str:

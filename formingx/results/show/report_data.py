@@ -1,7 +1,7 @@
 """Data of a run for reports and animations, from a path or from a checkpoint without the scene."""
 
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -22,6 +22,7 @@ from ..evaluate.profile import Profile, distance_to_line, refined
 from ..files.description import plain
 from ..files.progress import progress as shown_progress
 from ..files.status import target_column
+from .attempts import Attempts
 
 FRAMES = 100
 """Approximate number of drawn states."""
@@ -185,9 +186,9 @@ class ReportData:
         """Return the text ", from state ... on" of the first state in the mask, shape (n,)."""
         k = int(np.argmax(where))
         stage = f"{words(self.stages[k])!r}, " if self.stages[k] else ""
-        return f", from state {k} on ({stage}{self._control_of(k)})"
+        return f", from state {k} on ({stage}{self.control_text(k)})"
 
-    def _control_of(self, state: int) -> str:
+    def control_text(self, state: int) -> str:
         """Return name and value of the controlled quantity in a state, as text."""
         column = self.control(state)
         return f"{words(column)} = {self.measures[column][state]:.5g}"
@@ -198,7 +199,7 @@ class ReportData:
         k = int(np.argmax(errors))
         first = int(np.argmax(errors > NOTICEABLE))
         begins = f"; more than {100 * NOTICEABLE:g} % from state {first} on" if first < k else ""
-        where = f"state {k}, {self._control_of(k)}{begins}"
+        where = f"state {k}, {self.control_text(k)}{begins}"
         clamped = [found for found in self.findings if found.about == "volume" and "clamped" in found.text]
         return clamped or volume.findings(errors[k], where)
 
@@ -222,7 +223,7 @@ class ReportData:
 def of_path(path: Any) -> ReportData:
     """Return the data of a run for its report from its `Path`; collective."""
     from ...scene.summary import summary
-    problem, states, n = path.problem, path.states, len(path)
+    problem, states, n, attempts = path.problem, path.states, len(path), Attempts()
     with shown_progress(problem.comm, f"report of {n} states") as done:
         measures = {c: path[c] for c in path.columns}
         kinds, stages = [s.kind for s in states], [s.stage for s in states]
@@ -237,21 +238,38 @@ def of_path(path: Any) -> ReportData:
         drawn = drawn if timed else frames(progress(measures, profiles), kinds, stages)
         shown: list[dict[str, np.ndarray]] = [{} for _ in states]
         if profiles[-1] is not None:
-            fields = {id(entry): _Fields(path.same_mesh(entry.states[0]), profiles[-1]) for entry in path.segments}
-            for i, k in enumerate(drawn):
-                done(i / len(drawn))
-                shown[k] = fields[id(path.segment(states[k]))].evaluate(states[k])
+            shown = attempts.make("colours of stress, contact pressure and temperature",
+                                  lambda: _fields_of(path, drawn, profiles[-1], done), shown)
         stepping: dict = next((s.stepping for s in reversed(states) if s.stepping), {})
         tooling = Tooling.of_problem(problem)
-        wall = path.wall() if profiles[-1] is not None else None
+        layers: dict[str, np.ndarray] = {} if profiles[-1] is None else attempts.make(
+            "the walls of the layers", lambda: dict(path.wall().layers), {})
+        forces: dict[str, np.ndarray] = attempts.make("the curves of tool forces", lambda: tool_forces(path), {})
         return ReportData(summary(problem.scene), files.versions(), problem.scene.kinematics.dimension_of_volume == 3,
                       kinds, stages, measures, [list(s.history) for s in states], profiles, vars(path.counts),
                       target_column(stepping, measures), tooling,
                       [tooling.travels(s.setting, s.control) for s in states],
-                      tool_forces(path), shown, dict(wall.layers) if wall else {}, sys.argv[0],
-                      path.findings(), inadmissible_reasons=[s.inadmissible_reason for s in states],
+                      forces, shown, layers, sys.argv[0], [*path.findings(), *attempts.findings],
+                      inadmissible_reasons=[s.inadmissible_reason for s in states],
                       space=problem.scene.kinematics.components == 3, planes=problem.scene.symmetry,
                       **_heat(plain(problem.scene.heat)))
+
+
+def _fields_of(path: Any, drawn: Any, last: Profile, done: Callable[[float], Any]) -> list[dict[str, np.ndarray]]:
+    """Return the fields of each state of a run (`ReportData.fields`); collective.
+
+    Args:
+        path: the `Path`.
+        drawn: numbers of the drawn states.
+        last: profile of the sheet in the last state.
+        done: function that is called with the fraction of the states that is done.
+    """
+    found: list[dict[str, np.ndarray]] = [{} for _ in path.states]
+    fields = {id(entry): _Fields(path.same_mesh(entry.states[0]), last) for entry in path.segments}
+    for i, k in enumerate(drawn):
+        done(i / len(drawn))
+        found[k] = fields[id(path.segment(path.states[k]))].evaluate(path.states[k])
+    return found
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> ReportData:

@@ -37,14 +37,10 @@ def revolved(profile: Any, file: Any, comm: Any) -> None:
 def extruded(profile: Any, file: Any, comm: Any) -> None:
     """Draw a sheet in plane strain, extruded to 1.5 times its width, as a PNG (rank 0 draws).
 
-    The colour is the wall ratio; a half sheet, from r = 0, gets its mirror image. Another ending, or no screen, is an
-    InputError.
+    The colour is the wall ratio. Another ending, or no screen, is an InputError.
     """
     low, high = _bounds(profile)
-    if abs(low[0]) < 1e-6 * (high[0] - low[0]):
-        profile, width = _mirrored(profile), 2 * high[0]
-    else:
-        width = high[0] - low[0]
+    width = high[0] - low[0]
 
     def shifted(points, y):
         return points[:, 0], np.full(len(points), y), points[:, 1]
@@ -56,15 +52,6 @@ def extruded(profile: Any, file: Any, comm: Any) -> None:
 def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return the lower left and the upper right corner (r, z) of the box around a deformed sheet, length."""
     return profile.outline.min(0), profile.outline.max(0)
-
-
-def _mirrored(profile: Any) -> Any:
-    """Return the `Profile` of a half sheet joined with its mirror image at R = 0."""
-    def whole(points):
-        return np.vstack([points[:0:-1] * (-1, 1), points])
-    faces = profile.reference_bottom, profile.reference_top, profile.bottom, profile.top
-    other = None if profile.end is None else profile.end * (-1, 1)
-    return type(profile)(*(whole(points) for points in faces), other, profile.end)
 
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
