@@ -53,7 +53,7 @@ def test_a_bottle_is_trimmed_at_a_height():
     mesh = fx.mesh.parison(inner_radius=2.0, thickness=0.4, length=8.0, elements=(24, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), supports=[fx.Symmetry("axis"), fx.Clamped("neck")],
                      loads=[fx.Pressure("inner")])
-    path = fx.solve(scene, to=1e-3, increments=1, progress=False)
+    path = fx.solve(scene, to=1e-3, increments=1)
     part = path.part(path.states[0], trim=("height", 2.2 + 5.0))
     assert part.volume == pytest.approx(np.pi * (2 / 3 * (2.4**3 - 2**3) + (2.4**2 - 2**2) * 5.0), rel=1e-3)
     whole = path.part(path.states[0]).volume

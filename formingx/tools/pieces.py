@@ -126,42 +126,36 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
 
 def with_polyline(pieces: tuple[Line | Arc, ...], points: np.ndarray, radii: list[float], size: float
                   ) -> list[Line | Arc]:
-    """Return a profile whose part between two points on its lines is replaced by a polyline with fillets.
+    """Return a profile whose part between two places is replaced by a polyline with fillets (`Tool.with_piece`).
 
-    Args:
-        pieces: lines and arcs of the profile in order.
-        points: corners (R, Z) of the polyline, shape (n, 2), length; the first and the last lie on lines.
-        radii: fillet radius of each corner, length.
-        size: size of the profile, length.
-
-    Raises:
-        InputError: the first or the last point is not on a line, both are the same, or a fillet does not fit.
+    `points`, shape (n, 2), and `radii` are corners (R, Z) and fillets of the polyline, `size` is the size of the
+    profile; lengths.
     """
-    first, last = _lines_through(pieces, points[0], size), _lines_through(pieces, points[-1], size)
+    first, last = (_places(pieces, point, size) for point in (points[0], points[-1]))
     if first[0] > last[0]:
         points, radii, first, last = points[::-1], radii[::-1], last, first
-    (i, _), (j, _) = first[0], last[-1]
+    (i, u), (j, v) = first[0], last[-1]
     if math.dist(points[0], points[-1]) <= ROUND_OFF * size:
         raise InputError(f"Tool.with_piece: the first and the last point are the same, {text(points[0])}")
     corners, begin, end = list(points), pieces[i].ends[0], pieces[j].ends[1]
-    if math.dist(begin, points[0]) > _ON_PROFILE * size:
+    if u > -math.inf and math.dist(begin, points[0]) > _ON_PROFILE * size:
         corners, radii = [begin, *corners], [0.0, *radii]
-    if math.dist(end, points[-1]) > _ON_PROFILE * size:
+    if v < math.inf and math.dist(end, points[-1]) > _ON_PROFILE * size:
         corners, radii = [*corners, end], [*radii, 0.0]
     return [*pieces[:i], *rounded(np.array(corners), radii, False, True), *pieces[j + 1:]]
 
 
-def _lines_through(pieces: tuple[Line | Arc, ...], point: np.ndarray, size: float) -> list[tuple[int, float]]:
+def _places(pieces: tuple[Line | Arc, ...], point: np.ndarray, size: float) -> list[tuple[int, float]]:
     """Return number and arc length of the lines of a profile on which a point lies.
 
-    Args:
-        pieces: lines and arcs of the profile in order.
-        point: the point (R, Z), shape (2,), length.
-        size: size of the profile, length.
-
-    Raises:
-        InputError: the point is on no line.
+    A point on R = 0 stands for an end of the profile on R = 0, with the arc length -inf or inf.
     """
+    if abs(point[0]) <= _ON_PROFILE * size:
+        ends = [(math.dist(end, point), place) for end, place in (
+            (pieces[0].ends[0], (0, -math.inf)), (pieces[-1].ends[1], (len(pieces) - 1, math.inf)))
+            if abs(end[0]) <= _ON_PROFILE * size]
+        if ends:
+            return [min(ends)[1]]
     found, nearest = [], []
     for k, piece in enumerate(pieces):
         if isinstance(piece, Line):

@@ -207,7 +207,8 @@ class Tool:
         """Return the tool with a new piece of its profile: a stacking step, a ring of a thread, a chime.
 
         The new lines replace the part of the profile between the first and the last point. Both lie on straight lines
-        of the profile, which the new fillets shorten. The order of the points does not matter.
+        of the profile, which the new fillets shorten. A point on R = 0 may lie beside a profile that ends on R = 0: it
+        becomes the new end. The order of the points does not matter.
 
         Args:
             points: corners (R, Z) of the new piece, shape (n, 2), length.
@@ -225,7 +226,7 @@ class Tool:
         """
         corners = np.array([pair("Tool.with_piece: points", p)
                             for p in as_list("Tool.with_piece: points", points, "points (R, Z)")])
-        radii = list(np.asarray(fillets)) if np.ndim(fillets) > 0 else [fillets] * len(corners)
+        radii: list = list(np.asarray(fillets)) if np.ndim(fillets) > 0 else [fillets] * len(corners)
         if len(corners) < 2 or len(radii) != len(corners):
             raise InputError(f"Tool.with_piece: {len(corners)} points and {len(radii)} fillets: give at least two"
                              f" points, and one fillet, or one for each point")

@@ -192,8 +192,8 @@ def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
     line = {"x": rounded(cut["arc_length"]), "y": rounded(cut["wall"]), "name": "wall", "mode": "lines"}
     charts = (interactive.chart(f"Cut at {place}, through the thinnest place", units.label("arc_length", along),
                                 units.label("arc_length", "z"), [shape, mark], equal=True),
-              interactive.chart(f"Wall along the cut at {place}", units.label("arc_length"), units.label("wall"),
-                                [line], zero="y"))
+              interactive.chart(f"Wall along the cut at {place}, means at nodes", units.label("arc_length"),
+                                units.label("wall"), [line], zero="y"))
     return [chart for chart in charts if chart]
 
 

@@ -2,13 +2,11 @@
 
 import logging
 from collections.abc import Callable
-from typing import TypeVar
+from typing import Any
 
 from ...findings import Finding, error_text
 
 log = logging.getLogger("formingx")
-
-Content = TypeVar("Content")
 
 
 class Attempts:
@@ -25,7 +23,7 @@ class Attempts:
         self._refusals = refusals
         self.findings: list[Finding] = []
 
-    def make(self, name: str, draw: Callable[[], Content], fallback: Content) -> Content:
+    def make(self, name: str, draw: Callable[[], Any], fallback: Any) -> Any:
         """Return the result of a function, or a fallback if it fails; the error becomes a finding.
 
         Args:

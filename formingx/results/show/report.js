@@ -62,7 +62,7 @@ function through(run, at, axis, s) {
 
 const VIRIDIS = ["#440154", "#48186a", "#472d7b", "#424086", "#3b528b", "#33638d", "#2c728e", "#26828e", "#21918c", "#1fa088", "#28ae80",
   "#3fbc73", "#5ec962", "#84d44b", "#addc30", "#d8e219", "#fde725"], PORTLAND = ["#0c3383", "#0a88ba", "#f2d338", "#f28f38", "#d91e1e"], HUES = 32;
-const colours = field => field.startsWith("temperature") ? PORTLAND : field.startsWith("wall") ? [...VIRIDIS].reverse() : VIRIDIS;
+const palette = field => field.startsWith("temperature") ? PORTLAND : field.startsWith("wall") ? [...VIRIDIS].reverse() : VIRIDIS;
 function hue(scale, share) {                                               // share: 0 to 1
   const x = share * (scale.length - 1), k = Math.min(Math.floor(x), scale.length - 2);
   const [a, b] = [scale[k], scale[k + 1]].map(c => [1, 3, 5].map(i => parseInt(c.slice(i, i + 2), 16)));
@@ -84,7 +84,7 @@ function bands(run, at, field, range, rows, sides) {
       area[axis].push(...from, ...[...to].reverse(), from[0], null);
     }
   }
-  const scale = colours(field), moved = (map, v) => { const all = map(v); return all.map((x, i) => v[i] === null ? null : x); };
+  const scale = palette(field), moved = (map, v) => { const all = map(v); return all.map((x, i) => v[i] === null ? null : x); };
   return areas.flatMap((area, k) => area[0].length ? [{type: "scatter", mode: "lines", fill: "toself", hoverinfo: "skip", showlegend: false,
     fillcolor: hue(scale, (k + 0.5) / HUES), line: {color: hue(scale, (k + 0.5) / HUES), width: 2},
     x: sides.flatMap(([right]) => moved(right, area[0])), y: sides.flatMap(([, up]) => moved(up, area[1]))}] : []);
@@ -112,7 +112,7 @@ function sectionTraces(run, at, field, range) {
     x: across(r), y: up(z), opacity: 0,                                                     // they carry texts and the colour bar
     text: all(() => bottom[0].map((_, i) => `from ${run.sheet.from} ${format(run.sheet.material[i])}<br>` +
       Object.entries(at.all).map(([label, v]) => stated(label, v[i])).join("<br>"))),
-    marker: {size: 6, color: all(() => at.values), colorscale: colours(field).map((c, k, scale) => [k / (scale.length - 1), c]), cmin: range[0],
+    marker: {size: 6, color: all(() => at.values), colorscale: palette(field).map((c, k, scale) => [k / (scale.length - 1), c]), cmin: range[0],
       cmax: range[1], showscale: n === 0, colorbar: {thickness: 12, len: 0.85, outlinewidth: 0, exponentformat: "power",
       title: {text: narrow() ? "" : field, side: "right"}, ...(narrow() ? {orientation: "h", yref: "container", y: 0, yanchor: "bottom", len: 1} : {})}}}));
   return traces;

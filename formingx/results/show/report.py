@@ -10,6 +10,7 @@ import html
 import importlib.metadata
 import re
 from collections.abc import Callable, Sequence
+from functools import partial
 from importlib import resources
 from pathlib import Path as FilePath
 from tempfile import TemporaryDirectory
@@ -78,8 +79,8 @@ def write(records: ReportData | list[ReportData], file: Any, title: str, failure
 
     def make():
         refusing = Attempts(InputError)
-        parts = [refusing.make("the table of key numbers", lambda record=record: _part(record, units, density, trim),
-                               None) for record in records]
+        parts = [refusing.make("the table of key numbers", partial(_part, record, units, density, trim), None)
+                 for record in records]
         text = _page(records, names, parts, title or "Report of a run", failure, units, refusing.findings)
         files.replace(file, lambda stream: stream.write(text))
     files.on_root(comm, make)
@@ -147,6 +148,9 @@ and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothin
 <div id=marks></div><div id=now></div>
 <div class=views><div id=section></div><div id=solid></div></div></div>"""
 
+
+def _trouble(failure: Any, lead: str, attempts: Attempts) -> list[str]:
+    """Return the error message of a failed run as HTML, with a picture of its last admissible state.
 
     `lead` is the text before the heading, such as the name of the run. `attempts` collects the error of a picture.
     """
