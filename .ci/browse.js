@@ -35,15 +35,19 @@ const colours = async () => {
   return found;
 };
 
-// Places along the drawn section at which its wall has no colour: areas join all stations.
+// Gaps between the coloured areas of the wall of a section: each area but the last of an image ends where another begins.
 const gaps = () => {
-  const plot = plotsOf("#section.js-plotly-plot")[0], found = [];
-  if (!plot) return found;
-  const texts = plot.data.filter(trace => trace.mode === "markers"), areas = plot.data.filter(trace =>
-    trace.fill === "toself" && trace.x.includes(null)).reduce((sum, trace) => sum + trace.x.filter(x => x === null).length, 0);
-  const stations = new Set(texts[0].text).size;
-  if (areas < texts.length * (stations - 1)) found.push(`${areas} areas of colour for ${stations} stations and ${texts.length} images`);
-  return found;
+  const plot = plotsOf("#section.js-plotly-plot")[0], areas = [];
+  if (!plot) return [];
+  for (const trace of plot.data.filter(trace => trace.fill === "toself" && trace.x.includes(null))) {
+    let area = [];
+    trace.x.forEach((x, k) => {
+      if (x === null) { areas.push(area); area = []; } else area.push(`${x.toPrecision(5)} ${trace.y[k].toPrecision(5)}`);
+    });
+  }
+  const images = plot.data.filter(trace => trace.mode === "markers").length, begins = new Set(areas.map(area => area[0]));
+  const joined = areas.filter(area => area.some(point => point !== area[0] && begins.has(point))).length;
+  return areas.length && joined >= areas.length - images ? [] : [`the wall has gaps: ${joined} of ${areas.length} areas join`];
 };
 
 const move = () => {

@@ -39,7 +39,7 @@ class Chromium:
     """Chromium with one page."""
 
     def __init__(self, program: str):
-        self._folder = tempfile.TemporaryDirectory()
+        self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         commands, self._to = os.pipe()
         self._from, answers = os.pipe()
         words = [program, *OPTIONS, f"--user-data-dir={self._folder.name}", "about:blank"]

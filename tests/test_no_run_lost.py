@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 from conftest import treloar
+from mpi4py import MPI
 
 import formingx as fx
 from formingx import findings
+from formingx.extensions.design import report as design_report
 from formingx.extensions.remeshing.earlier_meshes import _OutlineProjection
 from formingx.extensions.space import show
 from formingx.mesh.locate import locate
 from formingx.problem.problem import Problem
+from formingx.results import files
 from formingx.results.show import interactive, report, report_data, views
 
 
@@ -103,6 +106,30 @@ def test_numbers_that_are_not_finite_lose_no_report(inflated, tmp_path, monkeypa
     assert "the charts of the wall could not be made" in text and "<h2>Made with</h2>" in text
 
 
+def test_a_picture_of_a_design_that_fails_is_named_in_its_report(tmp_path):
+    def careless():
+        raise ZeroDivisionError("float division by zero")
+    pictures = {"the picture of the walls": careless, "the picture of the part": lambda: "<p>a part</p>"}
+    file = design_report._write(tmp_path / "design.html", "Design", [], [], [], pictures, "", [], MPI.COMM_SELF)
+    text = file.read_text()
+    assert "the picture of the walls could not be made" in text and "<p>a part</p>" in text
+
+
+def test_any_error_of_rank_0_reaches_all_ranks():
+    """If rank 0 left without sending its error, the other ranks would wait for ever."""
+    class Ranks:
+        rank, size, sent = 0, 2, []
+
+        def bcast(self, content, root):
+            self.sent.append(content)
+            return content
+    ranks = Ranks()
+    with pytest.raises(ZeroDivisionError):
+        files.on_root(ranks, lambda: 1 / 0)
+    (result, error), = ranks.sent
+    assert result is None and isinstance(error, ZeroDivisionError)
+
+
 def test_the_report_explains_jumps(inflated):
     record = report_data.of_path(inflated)
     assert report.jumps(record) == ""
@@ -133,6 +160,7 @@ def test_the_report_in_space_cuts_through_the_thinnest_place(tray, tmp_path, mon
     thinnest = wall.middle[np.argmin(wall.wall)]
     assert (x, z) == (thinnest[0], thinnest[2]) and f"y = {thinnest[1]:.4g} mm" in shape["title"]
     assert min(np.hypot(*(np.column_stack([shape["traces"][0]["x"], shape["traces"][0]["y"]]) - (x, z)).T)) < 0.3
+    assert np.ptp(shape["traces"][0]["x"]) == pytest.approx(1.5, rel=1e-2) and shape["equal"]
     assert min(along["traces"][0]["y"]) == pytest.approx(wall.wall.min(), rel=0.05)
     drawn = show._mesh(tray, report_data.of_path(tray), fx.Units())
     assert [row[3] for row in drawn["thinnest"]][-1] == pytest.approx(wall.wall.min(), rel=1e-4)

@@ -69,18 +69,19 @@ function hue(scale, share) {                                               // sh
   return `rgb(${mix(a, b, x - k).map(Math.round).join(",")})`;
 }
 
-// The wall as closed areas, one between each two stations, of HUES colours; areas of one colour are one trace.
+// The wall as closed areas between stations, of HUES colours; areas of one colour are one trace.
 function bands(run, at, field, range, rows, sides) {
   const inner = [0, 1].map(axis => Array.from({length: rows - 1}, (_, k) => through(run, at, axis, (k + 1) / rows)));
   const across = (axis, i) => [at.bottom[axis][i], ...inner[axis].map(level => level[i]), at.top[axis][i]];
   const last = at.bottom[0].length - 1, areas = Array.from({length: HUES}, () => [[], []]);
-  for (let i = 0; i < last; i++) {
-    if (at.values[i] === null || at.values[i + 1] === null) continue;
-    const share = ((at.values[i] + at.values[i + 1]) / 2 - range[0]) / ((range[1] - range[0]) || 1);
-    const area = areas[Math.min(Math.max(Math.floor(HUES * share), 0), HUES - 1)];
+  const parts = Math.ceil(80 / last), between = (axis, i, f) => f ? mix(across(axis, i), across(axis, i + 1), f) : across(axis, i);
+  for (let n = 0; n < last * parts; n++) {
+    const i = Math.floor(n / parts), f = n / parts - i, v = mix([at.values[i]], [at.values[i + 1]], f + 0.5 / parts)[0];
+    if (v === null || at.values[i + 1] === null) continue;
+    const area = areas[Math.min(Math.max(Math.floor(HUES * (v - range[0]) / ((range[1] - range[0]) || 1)), 0), HUES - 1)];
     for (const axis of [0, 1]) {
-      const from = i === 0 && at.start[axis].length ? at.start[axis] : across(axis, i);
-      const to = i === last - 1 && at.end[axis].length ? at.end[axis] : across(axis, i + 1);
+      const from = n === 0 && at.start[axis].length ? at.start[axis] : between(axis, i, f);
+      const to = n === last * parts - 1 && at.end[axis].length ? at.end[axis] : between(axis, ...(n % parts === parts - 1 ? [i + 1, 0] : [i, f + 1 / parts]));
       area[axis].push(...from, ...[...to].reverse(), from[0], null);
     }
   }
