@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Iterator, Mapping
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -68,7 +69,8 @@ def plain(value: Any, depth: int = 8) -> Any:
         return text(value)
     code = class_code(type(value))
     return {"kind": type(value).__name__, **code,
-            **{k: plain(v, depth - 1) for k, v in vars(value).items() if code or not k.startswith("_")}}
+            **{k: plain(v, depth - 1) for k, v in vars(value).items()
+               if (code or not k.startswith("_")) and not isinstance(getattr(type(value), k, None), cached_property)}}
 
 
 def incomparable(about: Any, where: str = "") -> Iterator[tuple[str, str]]:
