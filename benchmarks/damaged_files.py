@@ -108,7 +108,8 @@ Physical Curve("mould") = {1, 2, 3};\n""")
         return [np.nan_to_num(column) for column in csv_files.read(file).columns.values()]
     readers: dict[str, Callable] = {
         "msh22": body, "msh41": body, "msh22b": body, "msh41b": body, "text": body, "geo": tool, "dxf": tool,
-        "step": tool, "brep": tool, "csv": table, "tests": lambda file: [t for _, t in read_tests(file)],
+        "step": tool, "brep": tool, "csv": table,
+        "tests": lambda file: [np.array([test.stretch, test.stress]) for test in read_tests(file)],
         "mshtool": lambda file: fx.tools.read(file, [1, 2, 3]).outline(),
         "heat": lambda file: values_at(file, np.array([[0.2, 0.03], [0.9, 0.11]]), sheet),
         "checkpoint": lambda run: [_numbers(s.x) for s in fx.load(run, scene).states]}

@@ -52,6 +52,10 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
             return (f"{driven!r} comes from outside and nothing else loads the flat body, which pushes it back all the"
                     f" way: the force must not be negative. It pulls only where it is withdrawn: in a stage"
                     f" of a Process, or with start=path")
+    if name.startswith("u_") and "_at_" in name and name.partition("_at_")[2].count("_") == 2:
+        section = scene.kinematics.components == 2
+        if section or scene.mesh.flat:
+            return f"at has three coordinates: must be {'(R, Z)' if section else '(x, y) on a flat sheet'}"
     if name.startswith("u_") and "_at_" in name and value != 0:
         found = _constraining_support(scene, name, [t for t in active if t in scene.supports])
         if found is not None:
