@@ -25,7 +25,7 @@ def form(friction, elements, depth, draft, fillet):
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")],
                      contacts=[fx.Contact("top", mould, friction)])
     targets = [fx.pressure(p) for p in PRESSURES]
-    path = fx.trace(scene, until=targets[-1], intermediate=targets[:-1], step=fx.StepControl(target=8), max_steps=1500)
+    path = fx.trace(scene, until=targets[-1], intermediate=targets[:-1], max_steps=1500)
     return path, mould
 
 

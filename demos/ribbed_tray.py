@@ -115,7 +115,7 @@ def main():
         args.out.mkdir(parents=True, exist_ok=True)
         write_mould(args.out / "mould.stl", step)
     COMM.Barrier()
-    mould = fx.tools.solid(args.out / "mould.stl")
+    mould = fx.tools.solid(args.out / "mould.stl", crease=0)     # its grid of heights does not follow its edges
     undercuts = mould.undercuts()
     summary = {"mould": {"triangles": mould.triangles, "undercut_area": undercuts["undercut_area"],
                          "least_draft": undercuts["min_draft"]}, "around_radius_mm": AROUND,

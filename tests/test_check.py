@@ -391,6 +391,7 @@ def test_every_demo_is_sound():
     told = {"cup_adapted": "its fillet of radius 0.0375",   # shorter than an element of its pilot: what it is about
             "measured_ldpe": "its tests (uniaxial",         # determine no alpha
             "even_pot": "its fillet of radius 0.15",        # coarse, for tens of runs
+            "ribbed_tray": "it has fillets of radius",      # coarse, for two minutes
             "set_block": "it is chilled"}                   # its stretch depends on the final temperature alone
     logger = logging.getLogger("formingx")
     level = logger.level                                    # some demos change it

@@ -13,6 +13,8 @@ A triangle whose control points lie in its plane and on its straight edges is tr
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ..._jit import NULL, address, address_of_integers
@@ -72,6 +74,7 @@ class PatchSurface:
         self.patches[flat] = control_points(corners[flat], straight, np.stack([straight, straight], 2))
         self.patches = np.ascontiguousarray(self.patches)
         self._bulges = np.where(flat, 0.0, bulge)
+        self._triangles = points, triangles, facet
         self._boxes = np.concatenate([self.patches.min(1), self.patches.max(1)], 1)
         nodes, links, self._order = np.zeros((2 * m, 6)), np.zeros((2 * m, 2), dtype=int), np.zeros(m, dtype=int)
         used = compiled().build(m, address(self._boxes), address(nodes), address_of_integers(links),
@@ -113,7 +116,18 @@ class PatchSurface:
             address(self._boxes), address(self._bulges), address(self.patches), address(d),
             address(normal) if derivatives else NULL, address(hessian) if derivatives else NULL,
             address_of_integers(triangles))
+        deep = np.flatnonzero(d > 2 * self._bulges.max())
+        if len(deep) and self._bulges.any():                # patches that fold at an edge can give the wrong sign
+            outside = deep[self._flat.distance(np.ascontiguousarray(x[deep])) < 0]
+            for values in (d, normal, hessian)[:3 if derivatives else 1]:
+                values[outside] *= -1
         return Distances(d, normal, hessian), triangles
+
+    @cached_property
+    def _flat(self) -> PatchSurface:
+        """The flat triangles. A point deeper inside the patches than their bulges is inside the triangles, too."""
+        points, triangles, facet = self._triangles
+        return PatchSurface(points, triangles, np.repeat(facet[:, None], 3, axis=1))
 
 
 def _neighbours(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
