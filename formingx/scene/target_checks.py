@@ -53,8 +53,9 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
                     f" way: the force must not be negative. It pulls only where it is withdrawn: in a stage"
                     f" of a Process, or with start=path")
     if name.startswith("u_") and "_at_" in name and name.partition("_at_")[2].count("_") == 2:
+        mesh: Any = scene.mesh
         section = scene.kinematics.components == 2
-        if section or scene.mesh.flat:
+        if section or mesh.flat:
             return f"at has three coordinates: must be {'(R, Z)' if section else '(x, y) on a flat sheet'}"
     if name.startswith("u_") and "_at_" in name and value != 0:
         found = _constraining_support(scene, name, [t for t in active if t in scene.supports])
