@@ -56,7 +56,8 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
         mesh: Any = scene.mesh
         section = scene.kinematics.components == 2
         if section or mesh.flat:
-            return f"at has three coordinates: must be {'(R, Z)' if section else '(x, y) on a flat sheet'}"
+            right = "(R, Z)" if section else "(x, y) on a flat sheet"
+            return f"the position `at` has three coordinates: must be {right}"
     if name.startswith("u_") and "_at_" in name and value != 0:
         found = _constraining_support(scene, name, [t for t in active if t in scene.supports])
         if found is not None:
