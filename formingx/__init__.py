@@ -85,8 +85,9 @@ with _optional():
     from .extensions.fits import beyond_tests as _fits_checks
     from .extensions.fits.data import treloar1944
     from .extensions.fits.fit import Fit, fit
-    from .extensions.fits.fit_in_time import TimedTest
+    from .extensions.fits.oscillation import OscillationTest
     from .extensions.fits.tested import MeasuredRange, with_tests
+    from .extensions.fits.timed_test import TimedTest
 with _optional():
     from .extensions.fits.fit_damping import Spectrum, fit_spectrum
 with _optional():

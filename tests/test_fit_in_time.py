@@ -152,3 +152,64 @@ def test_one_mode_does_not_determine_the_share_of_the_invariants():
     l = np.exp(np.linspace(0.2, 2.0, 10))
     test = fx.TimedTest.constant_rate("uniaxial", 0.2, l, melt.constant_rate("uniaxial", 0.2, l))
     assert "alpha" in fx.fit(melt, [test]).undetermined
+
+
+OMEGA = np.geomspace(1e-2, 1e2, 15)
+
+
+def oscillation(material, mode="shear", shift=1.0):
+    """Moduli of small oscillations from the sum over the branches, written here anew."""
+    x = OMEGA[:, None] * shift * np.array([tau for _, tau in material.branches])
+    mu, factor = np.array([mu for mu, _ in material.branches]), {"shear": 1.0, "uniaxial": 3.0}[mode]
+    storage = material.equilibrium.shear_modulus + (x**2 / (1 + x**2)) @ mu
+    return fx.OscillationTest(OMEGA, factor * storage, factor * (x / (1 + x**2)) @ mu, mode)
+
+
+@pytest.mark.parametrize("mode", ["shear", "uniaxial"])
+def test_oscillations_beside_a_tensile_test_give_the_constants(mode):
+    found = fx.fit(fx.Viscoelastic, [oscillation(P1, mode), rates(P1, "uniaxial", 0.1)])
+    assert found.material.parameters == pytest.approx(P1.parameters, rel=1e-4)
+    assert found.shares["tau_1"][f"1 {mode} oscillation"] > 0.5 and max(found.deviations.values()) < 1e-5
+    assert [panel.get_xscale() for panel in found.plot()] == ["linear", "log"]
+
+
+def test_small_oscillations_are_the_limit_of_the_law_in_time():
+    """A uniaxial strain 1e-4 sin(omega t), computed by the law in time, has the amplitude of the complex modulus."""
+    omega, periods, n = 0.7, 40, 4000
+    t = np.linspace(0, periods * 2 * np.pi / omega, n + 1)
+    stress = P1.stress("uniaxial", 1 + 1e-4 * np.sin(omega * t), times=t) / 1e-4
+    last = slice(n - n // periods + 1, None)
+    moduli = [2 * np.mean(stress[last] * wave(omega * t[last])) for wave in (np.sin, np.cos)]
+    test = fx.OscillationTest([omega, 2 * omega], [moduli[0], np.nan], [moduli[1], np.nan], "uniaxial")
+    assert fx.fit(P1, [test, oscillation(P1)]).deviations["1 uniaxial oscillation"] < 3e-3
+
+
+def test_oscillations_at_several_temperatures_give_the_shift():
+    true = fx.WLF(6.0, 90.0, 130.0)
+    tests = [oscillation(P1, shift=float(true(T))) for T in (118.0, 130.0, 150.0)]
+    found = fx.fit(fx.Viscoelastic, tests, temperature=[118.0, 130.0, 150.0], reference=130.0)
+    assert found.shift(np.array([118.0, 150.0])) == pytest.approx(true(np.array([118.0, 150.0])), rel=1e-3)
+    assert found.constants["mu_2"] == pytest.approx(0.4, rel=1e-3) and len(found.material.branches) == 2
+
+
+def test_low_moduli_count_as_much_as_high_ones():
+    """The modulus at 0.01 /s is 1e-5 of the highest; its misfit is relative to itself."""
+    x = OMEGA[:, None] * np.array([0.01, 100.0])
+    mu = np.array([1e5, 10.0])
+    test = fx.OscillationTest(OMEGA, (x**2 / (1 + x**2)) @ mu, (x / (1 + x**2)) @ mu)
+    found = fx.fit(fx.TransientNetwork(None, [(1e4, 0.1), (1e3, 10.0)]), [test])
+    assert found.constants["mu_2"] == pytest.approx(10.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("test, message", [
+    (fx.OscillationTest([1.0, 2.0], [1.0, 2.0], [1.0]), "have the shapes"),
+    (fx.OscillationTest([1.0, 2.0], [1.0, 2.0], [1.0, -1.0]), "must be above 0"),
+    (fx.OscillationTest([1.0, 2.0], [1.0, 2.0], [1.0, 1.0], "bending"), "mode 'bending'")])
+def test_wrong_oscillations(test, message):
+    with pytest.raises(fx.InputError, match=message):
+        fx.fit(fx.Viscoelastic, [test])
+
+
+def test_oscillations_do_not_determine_a_damping():
+    with pytest.raises(fx.InputError, match="fit_spectrum fits the spectrum"):
+        fx.fit(fx.KBKZ([(1.0, 1.0)], fx.PSM(alpha=10.0, beta=0.1)), [oscillation(P1)])

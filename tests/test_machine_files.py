@@ -68,3 +68,48 @@ def test_rates_and_temperatures_give_the_shift_and_the_constants(shift, count):
     assert len(found.errors) == 5 + count and all(np.isfinite(list(found.errors.values())))
     assert sum(found.shares["tau_1"].values()) == pytest.approx(1.0)
     assert len(found.plot().lines) >= 6
+
+
+CARD = fx.Viscoelastic(fx.NeoHookean(c10=0.05), [(0.4, 0.5), (0.2, 8.0)])
+
+
+def moduli(hertz, shift=1.0, factor=1.0):
+    x = 2 * np.pi * hertz[:, None] * shift * np.array([0.5, 8.0])
+    return factor * (0.1 + x**2 / (1 + x**2) @ [0.4, 0.2]), factor * (x / (1 + x**2) @ [0.4, 0.2])
+
+
+def test_oscillations_of_a_machine_beside_a_tensile_file(tmp_path):
+    """G' and G'' over the frequency in Hz at three temperatures, with tan delta, beside a tensile test in time."""
+    hertz, law = np.geomspace(1e-3, 10, 9), fx.WLF(6.0, 90.0, 130.0)
+    lines = ["frequency sweep", "Frequenz [Hz];G\u2032 [MPa];G\u2032\u2032 [MPa];tan delta;Temperatur [°C]"]
+    for T in (120.0, 130.0, 145.0):
+        lines += [f"{f:.9g};{G1:.9g};{G2:.9g};{G2 / G1:.4g};{T:g}".replace(".", ",")
+                  for f, G1, G2 in zip(hertz, *moduli(hertz, law(T)))]
+    (tmp_path / "sweep.txt").write_text("\n".join(lines), encoding="utf-16")
+    l = np.linspace(1.1, 2.0, 6)
+    (tmp_path / "tensile.csv").write_text("test,stretch,stress [MPa],time,temperature\n" + "\n".join(
+        f"uniaxial,{x},{P},{np.log(x)},130" for x, P in zip(l, CARD.constant_rate("uniaxial", 1.0, l))).replace(
+            "uniaxial,1.1", "uniaxial,1,,0,130\nuniaxial,1.1", 1))
+    found = fx.fit(fx.Viscoelastic, [tmp_path / "sweep.txt", tmp_path / "tensile.csv"], terms=2, reference=130.0)
+    assert found.shift(120.0) == pytest.approx(law(120.0), rel=1e-2)
+    assert found.constants["mu_1"] == pytest.approx(0.4, rel=1e-2) and "2 pi frequency" in str(found)
+    assert len(found.rms) == 4 and "tan delta is not used" in str(found)
+
+
+@pytest.mark.parametrize("head, arguments, message", [
+    ("frequency,storage modulus,loss modulus", {}, "shear or tension"),
+    ("frequency,G',G''", {"test": "uniaxial"}, "say the mode of the test"),
+    ("frequency,G',E''", {}, "must be one pair"),
+    ("time,G',G''", {}, "column 'time'"),
+    ("frequency [s],G',G''", {}, "'frequency' is in 's': must be in one of Hz")])
+def test_unclear_files_of_oscillations(tmp_path, head, arguments, message):
+    (tmp_path / "sweep.csv").write_text(head + "\n1,2,3\n2,3,3\n")
+    with pytest.raises(fx.InputError, match=message):
+        fx.fit(fx.Viscoelastic, tmp_path / "sweep.csv", **arguments)
+
+
+def test_files_in_several_units_of_stress(tmp_path):
+    (tmp_path / "sweep.csv").write_text("frequency,G' [Pa],G'' [Pa]\n1,2,3\n2,3,3\n")
+    (tmp_path / "tensile.csv").write_text("test,stretch,stress [MPa],time\nuniaxial,1,,0\nuniaxial,1.1,1,1\n")
+    with pytest.raises(fx.InputError, match="several units: Pa in .*sweep.csv, MPa in .*tensile.csv: convert"):
+        fx.fit(fx.Viscoelastic, [tmp_path / "sweep.csv", tmp_path / "tensile.csv"])

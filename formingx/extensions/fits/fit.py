@@ -18,14 +18,17 @@ from ...materials.relaxing import GeneralisedMaxwell
 from ...values.intervals import t_intervals
 from ...values.table import table
 from ...values.temperature import ABSOLUTE_ZERO
-from .fit_in_time import TimedTest, fit_timed_tests
+from .fit_in_time import fit_timed_tests
 from .fit_plot import draw_fit
 from .fit_shift import fit_shift
-from .measured import MeasuredTest, read_tests
+from .measured import MeasuredOscillation, MeasuredTest, read_tests
+from .oscillation import OscillationTest
 from .points import Points
+from .rows import rows_of
 from .tested import MeasuredRange
+from .timed_test import TimedTest
 from .uncertainty import Uncertainty, uncertainty
-from .weights import numbered_weights
+from .weights import MIN_DIVISOR, numbered_weights
 
 _FIRST_EVALUATIONS = 20
 """Largest number of evaluations of the residual from each first guess."""
@@ -94,8 +97,10 @@ class Fit(NamedTuple):
     def plot(self, axes: Axes | Sequence[Axes] | None = None, unit: str = "", unit_of_time: str = "s") -> Any:
         """Draw measured and fitted nominal stresses over the stretch, for relaxation tests over the time.
 
+        Moduli of oscillations are drawn over the angular frequency.
+
         Args:
-            axes: matplotlib axes; a pair if only some tests are relaxation tests, which are drawn on the first.
+            axes: matplotlib axes, one for each kind of tests: relaxation tests first, then others, then oscillations.
                 Default: a new figure.
             unit: unit of stress, for the label.
             unit_of_time: unit of time, for the label.
@@ -142,7 +147,7 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
         data: {test: (stretches, nominal stresses)}, arrays of shape (n,), for any of "uniaxial", "pure_shear" (planar)
             and "equibiaxial". For "biaxial": (stretches 1, stretches 2, nominal stresses 1, nominal stresses 2); nan
             for a stress that was not measured. The constants get the unit of the stress, force over reference area.
-            For a relaxing material: a list of `TimedTest`.
+            For a relaxing material: a list of `TimedTest` and `OscillationTest`.
             Or the name of a CSV file, or a list of such, with the columns test, stretch, stress (nominal), and for a
             relaxing material time. The columns may be in any order if a line names them, else in this order. In place
             of the stretch there may be a strain, a true strain (also in %) or a displacement, in place of the stress a
@@ -157,7 +162,8 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
             test. Default: 1.
         within: lowest and highest stretch of the points that count, or None for all. In biaxial tests both stretches
             must lie in the range.
-        test: name of the test in files without a column of it, such as "uniaxial".
+        test: name of the test in files without a column of it, such as "uniaxial"; of oscillations "shear" or
+            "uniaxial".
         specimen: {"length": gauge length, "width": ..., "thickness": ...}, or "area", for files with displacement and
             force.
         temperature: temperature of the tests, one for each test or file, or one for all; the files may have a column of
@@ -211,7 +217,7 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
                    )._replace(conversions=conversions)
 
 
-def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest]:
+def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest | MeasuredOscillation]:
     """Return the tests of the files among the data; empty if the data are no files.
 
     A `test` or `specimen` without files is an InputError.
@@ -221,10 +227,15 @@ def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest]:
         if test is not None or specimen is not None:
             raise InputError("fit: test and specimen are for data in files")
         return []
-    return [entry for name in names for entry in read_tests(file_path("fit: data", name), test, specimen)]
+    found = [entry for name in names for entry in read_tests(file_path("fit: data", name), test, specimen)]
+    units = {entry.unit: entry.source for entry in found if entry.unit is not None}
+    if len(units) > 1:
+        raise InputError(f"fit: data: the files have stresses in several units:"
+                         f" {', '.join(f'{unit} in {source}' for unit, source in units.items())}: convert them to one")
+    return found
 
 
-def _temperatures(data: Any, files: list[MeasuredTest], given: Any) -> list[float] | None:
+def _temperatures(data: Any, files: Sequence[MeasuredTest | MeasuredOscillation], given: Any) -> list[float] | None:
     """Return the temperature of each test from the arguments of `fit`, or None if it is not known.
 
     Another number of temperatures than tests, or ones in the files too, are an InputError.
@@ -265,8 +276,9 @@ def _fit_shifted(fitted: Callable, material: Any, tests: Any, temperatures: list
                            deviations={names[k]: v for k, v in result.deviations.items()}, shift=found.shift)
 
 
-def _fit_by_temperature(material: Any, files: list[MeasuredTest], temperatures: list[float], terms: int | None,
-                        relative: bool, weights: Any, within: Any, conversions: tuple[str, ...]) -> Fit:
+def _fit_by_temperature(material: Any, files: Sequence[MeasuredTest | MeasuredOscillation], temperatures: list[float],
+                        terms: int | None, relative: bool, weights: Any, within: Any, conversions: tuple[str, ...]
+                        ) -> Fit:
     """Fit an elastic material at each temperature; its constants become tables over the temperature.
 
     A constant that cannot depend on it, such as an exponent, is an InputError.
@@ -286,9 +298,8 @@ def _fit_by_temperature(material: Any, files: list[MeasuredTest], temperatures: 
     vars(card).pop("response", None)
     tables = {name: table({T: found.constants[name] for T, found in each.items()}) for name in names}
     card.parameters = {name: OfTemperature(curve) for name, curve in tables.items()}
-    card.tested = MeasuredRange.from_stretches(
-        {mode: np.concatenate([entry.stretch for entry in files if entry.mode == mode])
-         for mode in dict.fromkeys(entry.mode for entry in files)}, ())
+    elastic = _elastic(files)
+    card.tested = MeasuredRange.from_stretches({mode: stretch for mode, (stretch, _) in elastic.items()}, ())
 
     def merged(attribute: str) -> dict[str, Any]:
         """Return the entries of an attribute of the fits, with their temperatures."""
@@ -316,37 +327,43 @@ def _fit_timed(fitted: Callable, material: Any, tests: Any, terms: int | None, r
     return _timed_result(relaxing, constants, used, found)
 
 
-def _timed_result(relaxing: Any, constants: dict[str, float], used: list[TimedTest], found: Uncertainty) -> Fit:
+def _timed_result(relaxing: Any, constants: dict[str, float], used: list[Any], found: Uncertainty) -> Fit:
     """Return the `Fit` of a relaxing material with its {constant: value}, checked tests and uncertainty."""
-    misfits, measured, parts, n = [], [], {}, 0
+    rows = [rows_of(test) for test in used]
+    measured, computed = [part.measured for part in rows], [part.values(relaxing) for part in rows]
+    ends = np.cumsum([0, *map(len, measured)])
+    parts = {f"{i} {part.name}": slice(*ends[i - 1:i + 1]) for i, part in enumerate(rows, 1)}
+    floors = {name: part.floor for name, part in zip(parts, rows)}
     stretches: dict[str, list] = {}
-    rates = []
-    for i, test in enumerate(used, 1):
-        given = np.isfinite(test.stress)
-        computed = relaxing.stress(test.mode, test.stretches, times=test.times, between=test.between)
-        misfits.append((computed - test.stress)[given])
-        measured.append(test.stress[given])
-        parts[f"{i} {test.mode}"] = slice(n, n := n + int(given.sum()))
-        stretches.setdefault(test.mode, []).append(test.stretches[given])
+    rates = [np.zeros(0)]
+    for test in used:
+        if isinstance(test, OscillationTest):
+            stretches.setdefault("uniaxial", []).append(np.ones(1))
+            continue
+        stretches.setdefault(test.mode, []).append(test.stretches[np.isfinite(test.stress)])
         steps = np.diff(test.times)
         rates.append(np.abs(np.diff(np.log(test.stretches)))[steps > 0] / steps[steps > 0])
     strain_rates = np.concatenate(rates)
     strain_rates = strain_rates[strain_rates > 0]
     tested = MeasuredRange.from_stretches(
-        {mode: np.concatenate(rows) for mode, rows in stretches.items()}, found.undetermined,
+        {mode: np.concatenate(several) for mode, several in stretches.items()}, found.undetermined,
         (float(strain_rates.min()), float(strain_rates.max())) if len(strain_rates) else None)
-    return _result(relaxing, constants, parts, np.concatenate(misfits), np.concatenate(measured), found, tested, used)
+    misfit = np.concatenate(computed) - np.concatenate(measured)
+    return _result(relaxing, constants, parts, misfit, np.concatenate(measured), found, tested, used, floors)
 
 
 def _result(material: Any, constants: dict[str, float], parts: dict[str, slice], misfit: np.ndarray,
-            measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any) -> Fit:
+            measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any,
+            floors: dict[str, float] | None = None) -> Fit:
     """Return the `Fit` with a copy of a fitted material that stores the range of its tests, and with its misfits.
 
-    `misfit` is computed minus measured stress at m points, both (m,); `parts` has the slice of each test.
+    `misfit` is computed minus measured stress at m points, both (m,); `parts` has the slice of each test, `floors` its
+    smallest divisor over its largest stress.
     """
     fitted_material = copy.copy(material)
     fitted_material.tested = tested
-    deviations = {name: _rms(misfit[part] / np.maximum(abs(measured[part]), 0.02 * abs(measured[part]).max()))
+    least = dict.fromkeys(parts, MIN_DIVISOR) if floors is None else floors
+    deviations = {name: _rms(misfit[part] / np.maximum(abs(measured[part]), least[name] * abs(measured[part]).max()))
                   for name, part in parts.items()}
     rms = {name: _rms(misfit[part]) for name, part in parts.items()}
     return Fit(fitted_material, constants, rms, _rms(misfit), deviations, found.errors, found.undetermined,
@@ -406,13 +423,16 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
     return best, uncertainty(lambda x: points.stress(response, x), best.parameters, measured, points.sizes)
 
 
-def _elastic(files: list[MeasuredTest]) -> dict[str, tuple[np.ndarray, ...]]:
+def _elastic(files: Sequence[MeasuredTest | MeasuredOscillation]) -> dict[str, tuple[np.ndarray, ...]]:
     """Return {test: (stretches, stresses)} of tests from files without times.
 
     A file with times is an InputError.
     """
     found: dict[str, list] = {}
     for entry in files:
+        if isinstance(entry, MeasuredOscillation):
+            raise InputError(f"fit: data: {entry.source}: has oscillations: give a material that relaxes, such as"
+                             f" Viscoelastic")
         if entry.times is not None:
             raise InputError(f"fit: data: {entry.source}: has times; a material that does not relax has none: leave the"
                              f" column out")
@@ -420,16 +440,18 @@ def _elastic(files: list[MeasuredTest]) -> dict[str, tuple[np.ndarray, ...]]:
     return {mode: tuple(np.hstack(column) for column in zip(*parts)) for mode, parts in found.items()}
 
 
-def _in_time(files: list[MeasuredTest]) -> list[TimedTest]:
-    """Return the tests in time from files.
-
-    A file without times is an InputError.
-    """
+def _in_time(files: Sequence[MeasuredTest | MeasuredOscillation]) -> list[TimedTest | OscillationTest]:
+    """Return the tests in time and by oscillations from files; a file with neither is an InputError."""
+    found: list[TimedTest | OscillationTest] = []
     for entry in files:
-        if entry.times is None:
+        if isinstance(entry, MeasuredOscillation):
+            found.append(OscillationTest(entry.frequencies, entry.storage, entry.loss, entry.mode))
+        elif entry.times is None:
             raise InputError(f"fit: data: {entry.source}: has no times: a material that relaxes needs a fourth column"
                              f" with the time")
-    return [TimedTest(entry.mode, entry.times, entry.stretch, entry.stress) for entry in files]
+        else:
+            found.append(TimedTest(entry.mode, entry.times, entry.stretch, entry.stress))
+    return found
 
 
 def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]:

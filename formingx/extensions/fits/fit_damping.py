@@ -11,7 +11,9 @@ from ...errors import InputError, count, finite_array
 from ..kbkz.damping import Damping
 from ..kbkz.kbkz import KBKZ
 from .fit import IN_TIME
-from .fit_in_time import TimedTest, checked_tests
+from .fit_in_time import checked_tests
+from .oscillation import OscillationTest
+from .timed_test import TimedTest
 from .uncertainty import Uncertainty, uncertainty
 from .weights import divisors
 
@@ -96,6 +98,9 @@ def fit_damping(material: Any, tests: Any, terms: int | None, relative: bool, we
     if terms is not None:
         raise InputError(f"fit: terms = {terms!r}: {material} has its times already")
     used = checked_tests(tests, within)
+    if any(isinstance(test, OscillationTest) for test in used):
+        raise InputError("fit: KBKZ: small oscillations do not depend on the damping: fit_spectrum fits the spectrum to"
+                         " them")
     measured = [test.stress[np.isfinite(test.stress)] for test in used]
     sizes, stresses = divisors(measured, relative, weights), np.concatenate(measured)
     law, names = type(material.damping), list(material.damping.bounds)

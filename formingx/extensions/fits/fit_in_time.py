@@ -9,90 +9,27 @@ every result is admissible.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
-from ...errors import InputError, as_list, count, finite_array, positive
-from ...materials import branches, homogeneous
+from ...errors import InputError, as_list, count
 from ...materials.hyperelastic import NeoHookean
 from ...materials.material import Material
 from ...materials.relaxing import GeneralisedMaxwell
+from .oscillation import OscillationTest, checked_oscillation
+from .rows import equilibrium_values, row_divisors, rows_of
+from .timed_test import TimedTest, checked_timed_test
 from .uncertainty import Uncertainty, uncertainty
-from .weights import divisors, in_range
+from .weights import in_range
 
 _TIMES_PER_DECADE = 16
 """Number of relaxation times per decade at which the stress of a branch is computed; a cubic spline connects them."""
 
 
-class TimedTest(NamedTuple):
-    """Homogeneous test in time, with n points, of a body that is undeformed and relaxed before the test.
-
-    Args:
-        mode: "uniaxial", "pure_shear" or "equibiaxial".
-        times: times of the points, shape (n,), not decreasing. The first stretch is applied suddenly, at the first
-            time. If all stretches are equal and the first time is positive, it is applied at time 0 instead. Two
-            stretches at the same time are a jump.
-        stretches: stretches at these times, shape (n,).
-        stress: nominal stresses at these times, shape (n,); nan where the stress was not measured.
-        between: quantity that changes at a constant rate between two points, "stretch" or "strain" (logarithmic).
-
-    >>> held = fx.TimedTest("uniaxial", times=[0.0, 1.0, 5.0], stretches=[1.0, 2.0, 2.0], stress=[0.0, 1.2, 0.9])
-    >>> held.between                                                        # constant rate from time 0 to 1
-    'stretch'
-    """
-
-    mode: str
-    times: Any
-    stretches: Any
-    stress: Any
-    between: str = "stretch"
-
-    @classmethod
-    def relaxation(cls, mode: str, stretch: float, times: Any, stress: Any) -> TimedTest:
-        """Return a relaxation test, with a stretch that is applied suddenly at time 0 and then constant.
-
-        Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial".
-            stretch: the constant stretch.
-            times: times of the measured stresses, above 0, increasing, shape (n,).
-            stress: nominal stresses at these times, shape (n,).
-
-        Returns:
-            The test.
-
-        Raises:
-            InputError: times that are not finite numbers.
-        """
-        t = np.append(0.0, finite_array("TimedTest: times", times))
-        return cls(mode, t, np.full(len(t), stretch), np.append(np.nan, stress))
-
-    @classmethod
-    def constant_rate(cls, mode: str, rate: float, stretches: Any, stress: Any) -> TimedTest:
-        """Return a test at a constant Hencky rate (rate of the logarithmic strain), which begins at stretch 1.
-
-        Args:
-            mode: "uniaxial", "pure_shear" or "equibiaxial".
-            rate: Hencky rate, 1/time, above 0.
-            stretches: stretches of the measured stresses, in order, shape (n,).
-            stress: nominal stresses at these stretches, shape (n,).
-
-        Returns:
-            The test.
-
-        Raises:
-            InputError: a rate or a stretch that is not a positive number.
-        """
-        l = np.append(1.0, finite_array("TimedTest: stretches", stretches))
-        if not np.all(l > 0):
-            raise InputError(f"TimedTest: stretches = {stretches!r}: must be above 0")
-        times = np.abs(np.log(l)) / positive("TimedTest: rate", rate)
-        return cls(mode, times, l, np.append(np.nan, stress), "strain")
-
-
 def fit_timed_tests(material: type[GeneralisedMaxwell] | GeneralisedMaxwell, tests: Any, terms: int | None,
                    relative: bool, weights: list[float], within: Any
-                   ) -> tuple[GeneralisedMaxwell, dict[str, float], list[TimedTest], Uncertainty]:
+                   ) -> tuple[GeneralisedMaxwell, dict[str, float], list[Any], Uncertainty]:
     """Fit the constants of a relaxing material to tests in time.
 
     The results are the material, {constant: value}, the tests as arrays and the uncertainty. `terms` are branches, None
@@ -117,21 +54,24 @@ def fit_timed_tests(material: type[GeneralisedMaxwell] | GeneralisedMaxwell, tes
     return found, dict(found.parameters), data.tests, data.uncertainty(found)
 
 
-def checked_tests(tests: Any, within: Any = None) -> list[TimedTest]:
-    """Return tests in time as arrays, with nan for stresses at stretches outside the range `within`.
+def checked_tests(tests: Any, within: Any = None) -> list[Any]:
+    """Return tests in time and by oscillations as arrays, with nan for stresses at stretches outside `within`.
 
     A constant stretch with a positive first time gets a point at time 0. Inconsistent tests, or none with a stress, are
     an InputError.
     """
-    found = []
+    found: list[Any] = []
     for i, test in enumerate(as_list("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
+        name = f"fit: data: number {i}"
+        if isinstance(test, OscillationTest):
+            found.append(checked_oscillation(name, test))
+            continue
         if not isinstance(test, TimedTest):
-            raise InputError(f"fit: data: number {i} is {test!r}: must be a TimedTest: a material that relaxes"
+            raise InputError(f"{name} is {test!r}: must be a TimedTest or an OscillationTest: a material that relaxes"
                              f" needs the time")
-        test = test._replace(**_checked(f"fit: data: number {i}", test))
+        test = checked_timed_test(name, test)
         found.append(test._replace(stress=np.where(in_range(within, test.stretches), test.stress, np.nan)))
-    stress = np.concatenate([test.stress for test in found] or [np.zeros(0)])
-    if not np.any(np.isfinite(stress) & (stress != 0)):
+    if not any(np.any(rows_of(test).measured) for test in found):
         raise InputError("fit: data: no stress is given, or all are 0")
     return found
 
@@ -142,49 +82,42 @@ def _initial_material(kind: type[GeneralisedMaxwell]) -> GeneralisedMaxwell:
 
 
 class _TimedData:
-    """Measured stresses of all tests as one vector, and the stresses of a relaxing material at the same n points.
+    """Measured values of all tests as one vector, and the values of a relaxing material in the same n rows.
 
     Tests whose times are all the same are an InputError.
 
     Attributes:
         tests: the checked tests.
-        stress: measured nominal stresses, shape (n,).
-        scale: largest absolute measured stress, the unit of bounds and first guesses of moduli.
+        rows: their rows.
+        stress: measured nominal stresses and moduli, shape (n,).
+        scale: largest absolute measured value, the unit of bounds and first guesses of moduli.
         sizes: stress by which each misfit is divided, shape (n,).
-        log_tau: logarithms of the relaxation times at which the stress of a branch is computed, shape (k,).
-        branch: spline that returns the stresses of branches of unit modulus, shape (n, j), for the logarithms of their
-            relaxation times, shape (j,).
+        log_tau: logarithms of the relaxation times at which the values of a branch are computed, shape (k,).
         largest_I1: largest first invariant of C at the points.
     """
 
-    def __init__(self, tests: list[TimedTest], law: type[GeneralisedMaxwell], relative: bool, weights: list[float]):
-        self.tests = tests
-        measured = [np.isfinite(t.stress) for t in self.tests]
-        self.stress = np.concatenate([t.stress[m] for t, m in zip(self.tests, measured)])
+    def __init__(self, tests: list[Any], law: type[GeneralisedMaxwell], relative: bool, weights: list[float]):
+        self.tests, self.rows = tests, [rows_of(test) for test in tests]
+        self.stress = np.concatenate([part.measured for part in self.rows])
         self.scale = np.abs(self.stress).max()
-        self.sizes = divisors([t.stress[m] for t, m in zip(self.tests, measured)], relative, weights)
-        steps = np.concatenate([np.diff(t.times) for t in self.tests])
-        longest = max(t.times[-1] - t.times[0] for t in self.tests)
+        self.sizes = row_divisors(self.rows, relative, weights)
+        longest = max(part.longest for part in self.rows)
         if not longest > 0:
             raise InputError("fit: data: no test lasts any time: the times of each are all the same")
-        low, high = np.log(steps[steps > 0].min() / 10), np.log(10 * longest)
+        low, high = np.log(min(part.shortest for part in self.rows) / 10), np.log(10 * longest)
         self.log_tau = np.linspace(low, high, 2 + int(_TIMES_PER_DECADE * (high - low) / np.log(10)))
-        self._stretches = np.hstack([homogeneous.in_plane_stretches(t.mode, t.stretches[m])
-                                     for t, m in zip(self.tests, measured)])
-        l1, l2 = self._stretches
+        l1, l2 = np.hstack([part.stretches for part in self.rows])
         self.largest_I1 = float(np.max(l1**2 + l2**2 + (l1 * l2) ** -2))
-        from scipy.interpolate import CubicSpline
-        unit = [law.unit_stress(t.mode, np.exp(self.log_tau), t.times, t.stretches, t.between, 1e-8)[m]
-                for t, m in zip(self.tests, measured)]
-        self.branch: Callable = CubicSpline(self.log_tau, np.concatenate(unit), axis=1)
+        self._branches = [part.branch(law, self.log_tau, 1e-8) for part in self.rows]
+
+    def branch(self, log_tau: Any) -> np.ndarray:
+        """Return the values of j branches of unit modulus, (n, j), for the logarithms of their relaxation times, (j,).
+        """
+        return np.concatenate([part(log_tau) for part in self._branches])
 
     def equilibrium_stress(self, material: Material | None, constants: Any = None) -> np.ndarray:
-        """Return the nominal stresses of the equilibrium (None: 0) at all points, (n,); inf or nan beyond its limit.
-        """
-        if material is None:
-            return np.zeros(len(self.stress))
-        values = material.parameters.values() if constants is None else constants
-        return material.response.stress(self._stretches, values)[0]
+        """Return the values of the equilibrium (None: 0) in all rows, (n,); inf or nan beyond its limit."""
+        return equilibrium_values(self.rows, material, constants)
 
     def stresses(self, material: GeneralisedMaxwell, constants: np.ndarray) -> np.ndarray:
         """Return stresses (n,) of a material with b branches, for constants of equilibrium and b pairs, unchecked."""
@@ -199,7 +132,7 @@ class _TimedData:
 
 
 class ShiftedTests:
-    """Stresses of a relaxing material in tests at several temperatures.
+    """Values of a relaxing material in tests at several temperatures.
 
     A branch with the relaxation time tau at the reference temperature has the time aT tau in a test with the shift aT.
     The stresses of branches are computed once, over a wide range of times.
@@ -209,24 +142,19 @@ class ShiftedTests:
         sizes: stress by which each misfit is divided, shape (n,).
     """
 
-    def __init__(self, tests: list[TimedTest], material: Any, relative: bool, weights: list[float]):
-        from scipy.interpolate import CubicSpline
+    def __init__(self, tests: list[Any], material: Any, relative: bool, weights: list[float]):
         given = _initial_material(material) if isinstance(material, type) else material
-        measured = [np.isfinite(t.stress) for t in tests]
-        self.stress = np.concatenate([t.stress[m] for t, m in zip(tests, measured)])
-        self.sizes = divisors([t.stress[m] for t, m in zip(tests, measured)], relative, weights)
-        self._stretches = np.hstack([homogeneous.in_plane_stretches(t.mode, t.stretches[m])
-                                     for t, m in zip(tests, measured)])
-        self._splines = []
-        for test, mask in zip(tests, measured):
-            steps = np.diff(test.times)
-            if not np.any(steps > 0):
+        self._rows = [rows_of(test) for test in tests]
+        self.stress = np.concatenate([part.measured for part in self._rows])
+        self.sizes = row_divisors(self._rows, relative, weights)
+        self._branches: list[tuple[float, float, Callable]] = []
+        for part in self._rows:
+            if not part.longest > 0:
                 raise InputError("fit: data: a test lasts no time: its times are all the same")
-            low, high = np.log(steps[steps > 0].min() / 1000), np.log(1000 * np.ptp(test.times))
+            low, high = np.log(part.shortest / 1000), np.log(1000 * part.longest)
             grid = np.linspace(low, high, 2 + int(_TIMES_PER_DECADE / 2 * (high - low) / np.log(10)))
-            unit = type(given).unit_stress(test.mode, np.exp(grid), test.times, test.stretches, test.between, 1e-6)
-            self._splines.append(CubicSpline(grid, unit[mask], axis=1))
-        l1, l2 = self._stretches
+            self._branches.append((low, high, part.branch(type(given), grid, 1e-6)))
+        l1, l2 = np.hstack([part.stretches for part in self._rows])
         self._equilibrium = _scaled(given.equilibrium, 1.0, float(np.max(l1**2 + l2**2 + (l1 * l2) ** -2)))
 
     def branches(self, tau: np.ndarray, factors: np.ndarray) -> np.ndarray:
@@ -235,10 +163,10 @@ class ShiftedTests:
         The relaxation times tau, shape (j,), hold at the reference temperature; `factors` are the shifts of tests.
         """
         found = []
-        for spline, a in zip(self._splines, factors):
+        for (low, high, branch), a in zip(self._branches, factors):
             log_tau = np.log(tau) + np.log(a)
-            viscous = np.exp(np.minimum(log_tau - spline.x[0], 0.0))      # a fast branch: stress is tau times rate
-            found.append(viscous * spline(np.clip(log_tau, spline.x[0], spline.x[-1])))
+            viscous = np.exp(np.minimum(log_tau - low, 0.0))               # a fast branch: stress is tau times rate
+            found.append(viscous * branch(np.clip(log_tau, low, high)))
         return np.concatenate(found)
 
     def spectrum_misfit(self, factors: np.ndarray) -> float:
@@ -247,13 +175,12 @@ class ShiftedTests:
         `factors` are the shifts of the tests.
         """
         from scipy.optimize import nnls
-        low = min(spline.x[0] - np.log(a) for spline, a in zip(self._splines, factors))
-        high = max(spline.x[-1] - np.log(a) for spline, a in zip(self._splines, factors))
+        low = min(first - np.log(a) for (first, _, _), a in zip(self._branches, factors))
+        high = max(last - np.log(a) for (_, last, _), a in zip(self._branches, factors))
         tau = np.exp(np.linspace(low, high, 2 + int(2 * (high - low) / np.log(10))))
         columns = self.branches(tau, factors)
         if self._equilibrium is not None:
-            values = list(self._equilibrium.parameters.values())
-            columns = np.column_stack([self._equilibrium.response.stress(self._stretches, values)[0], columns])
+            columns = np.column_stack([equilibrium_values(self._rows, self._equilibrium), columns])
         return float(nnls(columns / self.sizes[:, None], self.stress / self.sizes)[1] ** 2)
 
     def stresses(self, material: GeneralisedMaxwell, constants: Any, factors: np.ndarray) -> np.ndarray:
@@ -262,9 +189,7 @@ class ShiftedTests:
         The constants, at the reference temperature, have the order of `parameters`.
         """
         values, n = np.asarray(constants, float), len(material.parameters) - 2 * len(material.branches)
-        rest = 0.0
-        if material.equilibrium is not None:
-            rest = material.equilibrium.response.stress(self._stretches, values[:n])[0]
+        rest = equilibrium_values(self._rows, material.equilibrium, values[:n])
         return rest + self.branches(values[n + 1::2], factors) @ values[n::2]
 
 
@@ -340,23 +265,3 @@ def _scaled(material: Material | None, factor: float, I1: float) -> Material | N
         return type(material).guesses(factor * material.shear_modulus, I1, None)[0]
     except InputError:                                          # the class has no first guess
         return material
-
-
-def _checked(name: str, test: TimedTest) -> dict[str, Any]:
-    """Return {argument of `TimedTest`: array} of a test, checked.
-
-    Inconsistent arrays, or a first stretch other than 1 at an unknown time, are an InputError.
-    """
-    t, l = branches.checked(name, test.mode, test.times, test.stretches, test.between)
-    try:
-        stress = np.asarray(test.stress, float)
-    except (TypeError, ValueError):
-        raise InputError(f"{name}: stress = {test.stress!r}: must be numbers") from None
-    if stress.shape != t.shape:
-        raise InputError(f"{name}: stress has the shape {stress.shape}, times {t.shape}: must be the same")
-    if t[0] != 0 and l[0] != 1:                                 # applied at an unknown time
-        if np.ptp(l) > 0 or t[0] < 0:
-            raise InputError(f"{name}: begins at time {t[0]:.6g} with a stretch of {l[0]:.6g}: since when? Begin with"
-                             f" the time at which it was put on, the stress left empty (not a number)")
-        t, l, stress = np.append(0.0, t), np.append(l[0], l), np.append(np.nan, stress)
-    return {"times": t, "stretches": l, "stress": stress}

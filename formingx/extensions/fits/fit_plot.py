@@ -6,32 +6,47 @@ import numpy as np
 
 from ...errors import InputError
 from ...figures import figure
+from .oscillation import OscillationTest
+from .rows import rows_of
+
+_XLABELS = {"time": "time ({})", "stretch": "stretch", "frequency": "angular frequency (1/{})"}
+"""{quantity over which tests are drawn: label of the axis, with a place for the unit of time}, in the order of panels.
+"""
 
 
 def draw_fit(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
-    """Draw measured and fitted nominal stresses over the stretch, for relaxation tests over the time.
+    """Draw measured and fitted stresses over the stretch, of relaxation tests over the time, moduli over the frequency.
 
-    It returns the axes, a pair for both kinds of tests; single ones for both are an InputError. Data are {test:
-    columns} or a list of `TimedTest`.
+    It returns the axes, one for each of these kinds of tests; another number of given axes is an InputError. Data are
+    {test: columns} or a list of `TimedTest` and `OscillationTest`.
     """
-    constant = [] if isinstance(data, dict) else [np.ptp(test.stretches) == 0 for test in data]
-    count = 1 + (any(constant) and not all(constant))
+    kinds = ["stretch"] if isinstance(data, dict) else [_kind(test) for test in data]
+    present = [kind for kind in _XLABELS if kind in kinds]
     if axes is None:
-        axes = figure(count)[1]
+        axes = figure(len(present))[1]
     panels = np.ravel(axes)
-    if len(panels) != count:
-        raise InputError(f"Fit.plot: axes: {len(panels)} given: these tests need {count}, one for relaxation tests"
-                         f" (held stretch), one for the others")
+    if len(panels) != len(present):
+        raise InputError(f"Fit.plot: axes: {len(panels)} given: these tests need {len(present)}, one for each of:"
+                         f" relaxation tests (held stretch), other tests, oscillations")
+    panel_of = dict(zip(present, panels))
     if isinstance(data, dict):
         _draw_elastic(material, data, panels[0])
     else:
-        _draw_timed(material, data, constant, panels)
-    label = "nominal stress" + f" ({unit})" * bool(unit)
-    for i, panel in enumerate(panels):
-        in_time = any(constant) and i == 0
-        panel.set(xlabel=f"time ({unit_of_time})" if in_time else "stretch", ylabel=label)
+        for i, (test, kind) in enumerate(zip(data, kinds), 1):
+            draw = _draw_oscillation if kind == "frequency" else _draw_timed
+            draw(material, test, i, panel_of[kind])
+    for kind, panel in panel_of.items():
+        label = "storage and loss modulus" if kind == "frequency" else "nominal stress"
+        panel.set(xlabel=_XLABELS[kind].format(unit_of_time), ylabel=label + f" ({unit})" * bool(unit))
         panel.legend()
     return axes
+
+
+def _kind(test: Any) -> str:
+    """Return the quantity over which a test is drawn: "time", "stretch" or "frequency"."""
+    if isinstance(test, OscillationTest):
+        return "frequency"
+    return "time" if np.ptp(test.stretches) == 0 else "stretch"
 
 
 def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
@@ -60,20 +75,25 @@ def _draw_biaxial(material: Any, columns: Any, panel: Any) -> None:
         panel.plot(l1, np.where(np.isfinite(P), found, np.nan), "x", ms=5, color=points.get_color())
 
 
-def _draw_timed(material: Any, tests: Any, constant: list[bool], panels: Any) -> None:
-    """Draw stresses of tests in time, with curves of the material.
+def _draw_timed(material: Any, test: Any, number: int, panel: Any) -> None:
+    """Draw stresses of a test in time over the stretch, or the logarithmic time if this is constant, with a curve."""
+    is_relaxation = _kind(test) == "time"
+    t, l = np.asarray(test.times, float), np.asarray(test.stretches, float)
+    x, label = (t - t[0], f"stretch {l[0]:g}") if is_relaxation else (l, _rate(t, l))
+    points, = panel.plot(x, test.stress, "o", ms=4, label=f"{number} {test.mode.replace('_', ' ')}, {label}")
+    panel.plot(x, material.stress(test.mode, l, times=t, between=test.between), color=points.get_color())
+    if is_relaxation:
+        panel.set_xscale("log")
 
-    Tests at `constant` stretch go over the logarithmic time on the first of the panels, the others over stretch on the
-    last.
-    """
-    for i, (test, is_relaxation) in enumerate(zip(tests, constant), 1):
-        panel = panels[0] if is_relaxation else panels[-1]
-        t, l = np.asarray(test.times, float), np.asarray(test.stretches, float)
-        x, label = (t - t[0], f"stretch {l[0]:g}") if is_relaxation else (l, _rate(t, l))
-        points, = panel.plot(x, test.stress, "o", ms=4, label=f"{i} {test.mode.replace('_', ' ')}, {label}")
-        panel.plot(x, material.stress(test.mode, l, times=t, between=test.between), color=points.get_color())
-        if is_relaxation:
-            panel.set_xscale("log")
+
+def _draw_oscillation(material: Any, test: OscillationTest, number: int, panel: Any) -> None:
+    """Draw storage and loss moduli of a test over the angular frequency, with curves of the material."""
+    fine = np.geomspace(test.frequencies[0], test.frequencies[-1], 100)
+    moduli = rows_of(OscillationTest(fine, fine, fine, test.mode)).values(material)
+    symbols = ("G'", "G''") if test.mode == "shear" else ("E'", "E''")
+    for values, marker, name, curve in zip((test.storage, test.loss), "os", symbols, np.split(moduli, 2)):
+        points, = panel.loglog(test.frequencies, values, marker, ms=4, label=f"{number} {name}")
+        panel.plot(fine, curve, color=points.get_color())
 
 
 def _rate(times: np.ndarray, stretches: np.ndarray) -> str:

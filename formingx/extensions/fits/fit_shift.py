@@ -16,7 +16,8 @@ from ...errors import InputError, check_name
 from ...materials.relaxing import GeneralisedMaxwell
 from ...values.table import Table
 from ...values.temperature import ABSOLUTE_ZERO, GAS_CONSTANT, WLF, Arrhenius
-from .fit_in_time import ShiftedTests, TimedTest, checked_tests
+from .fit_in_time import ShiftedTests, checked_tests
+from .rows import at_reference
 from .uncertainty import Uncertainty, uncertainty
 
 SHIFTS = ("WLF", "Arrhenius", "table")
@@ -56,18 +57,18 @@ class ShiftedFit(NamedTuple):
         material: the material with its shift.
         shift: the shift aT(T).
         constants: {constant: value} of the material at the reference temperature and of the shift.
-        tests: the tests with their times at the reference temperature.
+        tests: the tests with their times and frequencies at the reference temperature.
         uncertainty: uncertainty of all constants.
     """
 
     material: GeneralisedMaxwell
     shift: Any
     constants: dict[str, float]
-    tests: list[TimedTest]
+    tests: list[Any]
     uncertainty: Uncertainty
 
 
-def fit_shift(fitted: Callable, material: Any, tests: list[TimedTest], temperatures: np.ndarray, kind: str,
+def fit_shift(fitted: Callable, material: Any, tests: list[Any], temperatures: np.ndarray, kind: str,
               reference: float, unit: str, terms: int | None, relative: bool, weights: list[float], within: Any
               ) -> ShiftedFit:
     """Fit the constants of a relaxing material and their shift with the temperature.
@@ -79,10 +80,9 @@ def fit_shift(fitted: Callable, material: Any, tests: list[TimedTest], temperatu
     check_name("fit: shift", kind, SHIFTS)
     law = _law(kind, np.asarray(temperatures, float), reference, unit)
 
-    def shifted(unknowns: np.ndarray) -> list[TimedTest]:
-        """Return the tests with the times that they have at the reference temperature."""
-        factors = 10.0 ** law.factors(unknowns)
-        return [test._replace(times=np.asarray(test.times, float) / a) for test, a in zip(tests, factors)]
+    def shifted(unknowns: np.ndarray) -> list[Any]:
+        """Return the tests with the times and frequencies that they have at the reference temperature."""
+        return [at_reference(test, a) for test, a in zip(tests, 10.0 ** law.factors(unknowns))]
 
     data = ShiftedTests(checked_tests(tests, within), material, relative, weights)
 
@@ -119,7 +119,7 @@ def _polished(base: GeneralisedMaxwell, law: _ShiftLaw, unknowns: np.ndarray, da
 
 
 def _result(base: GeneralisedMaxwell, law: _ShiftLaw, unknowns: np.ndarray, data: ShiftedTests,
-            used: list[TimedTest]) -> ShiftedFit:
+            used: list[Any]) -> ShiftedFit:
     """Return the fit with the uncertainty of all constants, those of the material and those of the shift together."""
     p, p_base = len(unknowns), len(base.parameters)
     scales = np.maximum(np.abs(unknowns), 0.1)                # the values are 1 + (unknown - its value)/scale

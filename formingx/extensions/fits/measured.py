@@ -19,6 +19,13 @@ from ...io.csv_files import name_and_unit, records
 from ...io.numerals import is_number
 from ...materials.homogeneous import MODES
 from ...units import FORCES, LENGTHS, STRESSES
+from .measured_oscillation import (
+    MODULI,
+    OSCILLATION_COLUMNS,
+    MeasuredOscillation,
+    read_oscillations,
+    used_columns,
+)
 
 _QUANTITIES = {
     "test": ("test", "mode", "versuch", "prufart"),
@@ -37,7 +44,7 @@ _QUANTITIES = {
     "temperature": ("temperature", "temp", "temperatur", "pruftemperatur"),
 }
 """{quantity: names of its column, in lower case and without accents}."""
-_NAMES = {name: quantity for quantity, names in _QUANTITIES.items() for name in names}
+_NAMES = {name: quantity for quantity, names in (_QUANTITIES | OSCILLATION_COLUMNS).items() for name in names}
 _STRETCHES, _STRESSES = ("stretch", "strain", "true strain", "displacement"), ("stress", "true stress", "force")
 _UNITS: dict[str, tuple[str, ...]] = {
     "strain": ("%", "mm/mm", "m/m"), "true strain": ("%",), "displacement": tuple(LENGTHS), "stress": tuple(STRESSES),
@@ -57,6 +64,7 @@ class MeasuredTest(NamedTuple):
         temperature: temperature of the test, or None.
         source: name of the file.
         conversions: what was done to the columns, as text.
+        unit: unit of the stress, or None if the file does not say it.
     """
 
     mode: str
@@ -66,9 +74,10 @@ class MeasuredTest(NamedTuple):
     temperature: float | None
     source: str
     conversions: tuple[str, ...]
+    unit: str | None = None
 
 
-def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> list[MeasuredTest]:
+def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> list[MeasuredTest | MeasuredOscillation]:
     """Return the tests of a CSV file, by default with columns test, stretch, nominal stress and, in time, time.
 
     A test ends where its name or temperature changes, or the time decreases. `specimen` has "length" and "area", or
@@ -90,6 +99,8 @@ def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> lis
             for name, k in columns.items():
                 units[name] = rows[start][1][k].strip("[]()") or units.get(name)
             start += 1
+        if columns.keys() & MODULI:
+            return [*read_oscillations(caller, columns, rows[start:], units, test)]
         columns = _checked_columns(caller, columns, rows, start, units, test)
     body = rows[start:]
     if not body:
@@ -98,13 +109,14 @@ def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> lis
         check_name("fit: test", test, MODES)
     points = [_point(f"{caller}, line {n}", row, width, columns, test) for n, row in body]
     converted, conversions = _converted(caller, points, units, specimen)
-    found = []
+    found: list[MeasuredTest | MeasuredOscillation] = []
+    unit = units.get("stress") or units.get("true stress")
     for _, group in itertools.groupby(zip(_test_numbers(converted), converted), key=lambda pair: pair[0]):
         part = [point for _, point in group]
         times = np.array([p["time"] for p in part]) if "time" in part[0] else None
         found.append(MeasuredTest(part[0]["test"], np.array([p["stretch"] for p in part]),
                                   np.array([p["stress"] for p in part]), times, part[0].get("temperature"),
-                                  str(file), conversions))
+                                  str(file), conversions, unit))
     return found
 
 
@@ -157,20 +169,13 @@ def _checked_columns(caller: str, columns: dict[str, int], rows: list[tuple[int,
                              f" of the file")
     if test is not None and "test" in columns:
         raise InputError(f"{caller}: has a column 'test': give no test={test!r}")
-    for name, k in columns.items():
-        numeric = any(k < len(row) and is_number(row[k]) for _, row in rows[start:])
-        if name not in _QUANTITIES and numeric:
-            raise InputError(f"{caller}: the first line names a column {name!r}, which a fit does not use: leave it out"
-                             f" of the file; used are {', '.join(_QUANTITIES)}")
-        unit = units.get(name)
-        if name in _QUANTITIES and unit is not None and unit not in _UNITS.get(name, ()):
-            raise InputError(f"{caller}: column {name!r} is in {unit!r}: must be"
-                             f" {'in one of ' + ', '.join(_UNITS[name]) if name in _UNITS else 'without a unit'}")
-    return {name: k for name, k in columns.items() if name in _QUANTITIES}
+    return used_columns(caller, columns, rows[start:], units, _QUANTITIES, _UNITS)
 
 
 def _plain(words: str) -> str:
     """Return words in lower case, without accents, underscores and double spaces."""
+    for quote in "\u2019\u2032\u00b4":                       # quotation marks and primes of G' and G''
+        words = words.replace(quote, "'")
     plain = unicodedata.normalize("NFKD", words.lower()).encode("ascii", "ignore").decode()
     return " ".join(plain.replace("_", " ").replace("-", " ").split())
 

@@ -8,22 +8,23 @@ import numpy as np
 
 from ...errors import InputError, as_list, check_type, non_negative, pair
 
-_MIN_DIVISOR = 0.02
+MIN_DIVISOR = 0.02
 """Smallest divisor of a relative misfit, over the largest stress of its test."""
 
 
-def divisors(parts: list[np.ndarray], relative: Any, weights: list[float]) -> np.ndarray:
+def divisors(parts: list[np.ndarray], relative: Any, weights: list[float], floors: list[float] | None = None
+             ) -> np.ndarray:
     """Return the stress by which the misfit of each measured stress is divided, shape (n,).
 
-    `relative` takes the stress itself, at least 2 % of its test's largest, otherwise the largest of all; weights divide
-    by their root. Neither True nor False is an InputError.
+    `relative` takes the stress itself, at least its test's largest times the floor (default 0.02), otherwise the
+    largest of all; weights divide by their root. Neither True nor False is an InputError.
     """
     relative = check_type("fit: relative", relative, bool, "True or False")
     largest = max((float(np.abs(P).max()) for P in parts if len(P)), default=1.0) or 1.0
     found = []
-    for P, weight in zip(parts, weights):
+    for P, weight, floor in zip(parts, weights, floors or [MIN_DIVISOR] * len(parts)):
         own = float(np.abs(P).max(initial=0.0)) or largest
-        size = np.maximum(np.abs(P), _MIN_DIVISOR * own) if relative else np.full(len(P), largest)
+        size = np.maximum(np.abs(P), floor * own) if relative else np.full(len(P), largest)
         found.append(size / np.sqrt(weight))
     return np.concatenate(found)
 
