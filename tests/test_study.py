@@ -3,7 +3,12 @@
 import dataclasses
 import logging
 import math
+import os
+import signal
+import threading
+import time
 from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -250,3 +255,30 @@ def test_a_study_on_a_dask_cluster(here, tmp_path):
     with distributed.Client(n_workers=1, threads_per_worker=1, processes=False, dashboard_address=None) as client:
         found = run(client.get_executor(), folder=tmp_path / "study")
     assert len(found.successful) == len(found.runs)
+
+
+def slow_square(x):
+    """In place of a run of half a second; writes that it ran."""
+    time.sleep(0.5)
+    Path(f"ran_{x}_{os.getpid()}").touch()
+    return SimpleNamespace(f=x * x)
+
+
+@pytest.mark.thorough
+def test_a_killed_dask_worker_loses_no_run_that_has_ended(tmp_path, monkeypatch):
+    """Of eight runs on two workers, one killed after a while, all are found; none that had ended runs again."""
+    distributed = pytest.importorskip("distributed")
+    monkeypatch.chdir(tmp_path)
+    with (distributed.LocalCluster(n_workers=2, threads_per_worker=1, dashboard_address=None) as cluster,
+          distributed.Client(cluster) as client):
+        victim = next(iter(client.run(os.getpid).values()))
+
+        def kill():
+            while len(list(tmp_path.glob("ran_*"))) < 4:
+                time.sleep(0.01)
+            os.kill(victim, signal.SIGKILL)
+        threading.Thread(target=kill, daemon=True).start()
+        found = fx.study(slow_square, {"x": list(range(8))}, {"f": f}, folder="study", executor=client.get_executor(),
+                         progress=False)
+    assert sorted(run.measures["f"] for run in found.successful) == [x * x for x in range(8)]
+    assert len(list(tmp_path.glob("ran_*"))) <= 9                       # at most the run that was killed at its end

@@ -108,9 +108,11 @@ def completed_runs(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRu
     """
     for batch in (cases[:1], cases[1:]):
         jobs: dict[Any, dict] = {pool.submit(task, case): case for case in batch}
-        for job in futures.as_completed(jobs):
-            failure = job.exception()
-            yield job.result() if failure is None else StudyRun(jobs[job], error=f"{type(failure).__name__}: {failure}")
+        for job in futures.as_completed(list(jobs)):
+            case, failure = jobs.pop(job), job.exception()             # a cluster forgets a run that nobody holds
+            run = job.result() if failure is None else StudyRun(case, error=f"{type(failure).__name__}: {failure}")
+            del job
+            yield run
 
 
 def executor_context(executor: futures.Executor | None, workers: int) -> Any:
