@@ -1,4 +1,4 @@
-"""Forms of a scene: common base class of solids and membranes.
+"""Forms of a scene: common base class of solids, membranes and sheets in three dimensions.
 
 Unknowns are dimensionless: displacements are divided by `length` (the largest extent of the mesh), pressures by
 `stress` (the largest shear modulus), the energy by stress times reference volume. A run therefore does not depend on
@@ -7,6 +7,7 @@ the user's units, and the solver works with numbers of order one.
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from functools import cached_property
 from typing import Any
 
@@ -15,13 +16,14 @@ import numpy as np
 import ufl
 from dolfinx import fem
 from mpi4py import MPI
+from petsc4py import PETSc
+from ufl.algorithms.analysis import extract_constants
 
 from .. import _compat
 from ..errors import call_on_all_ranks
 from ..physics import kinematics as kin
 from ..ranks import combined
 from .admissible import Admissible
-from .controlled_loads import ControlledLoads
 from .free_stretch import FreeStretch
 from .history import History
 from .loaded_body import LoadedBody
@@ -31,7 +33,7 @@ from .probes import Probe
 from .temperature import Temperature
 
 
-class Formulation(ControlledLoads):
+class Formulation(ABC):
     """Fields and variational forms (UFL) of a model declaration (`Scene`), without contact.
 
     Displacements are divided by `length`, pressures by `stress`, and the residual by stress times volume.
@@ -132,6 +134,77 @@ class Formulation(ControlledLoads):
         damaged = [self.weighted(self._scale * terms.damage_energy(), terms.names)
                    for terms in changing if terms not in timed]
         self.damage_energy = sum(damaged[1:], damaged[0]) if damaged else None
+
+    def _add_supports(self, body: LoadedBody) -> None:
+        """Add the energies of elastic supports."""
+        self.elastic_supports = []
+        for support in self.scene.supports:
+            energy = body.stored(support)
+            if energy is not None:
+                active = self.constant(1.0)
+                self.elastic_supports.append((support, active))
+                self.potential, self.energy = (None if e is None else e + self._scale * active * energy
+                                               for e in (self.potential, self.energy))
+
+    def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
+        """Return the residual and its derivatives by the control, through loads and through time (UFL, rank 1).
+
+        body: fields and integrals for the virtual works. A derivative that the scene does not have is None.
+        """
+        v, control = self.test_function(), self._control
+        residual = ufl.derivative(self.potential, self.w, v)
+        for entry in self.terms:
+            if work := entry.unsymmetric_work(self.elastic_F, lambda f: ufl.derivative(f, self.w, v)):
+                residual += self.weighted(self._scale * work, entry.names)
+        timed = ufl.Form([i for i in self.potential.integrals() if self.control in extract_constants(i.integrand())])
+        by_time = ufl.derivative(ufl.diff(timed, control), self.w, v) if timed.integrals() else None
+        terms = []
+        self._loads, self.load_works, self.load_values = [], [], []
+        for load, scale in zip(self.scene.loads, self.scales):
+            base, rate = self.constant(0.0 if load.driven else load.value), self.constant(0.0)
+            self._loads.append((load, base, rate))
+            value = self.constant(scale) * (base + rate * control) if load.driven else base
+            self.load_values.append((load, value))
+            work = body.work(load, value)
+            self.load_works.append(work)
+            residual -= self._scale * work
+            if load.driven:
+                terms.append(-self._scale * ufl.diff(work, control))
+        return residual, sum(terms[1:], terms[0]) if terms else None, by_time
+
+    def constant(self, value: float) -> fem.Constant:
+        """Return a UFL constant; a new value needs no new compilation of the forms that contain it."""
+        return fem.Constant(self.domain, PETSc.ScalarType(value))
+
+    @property
+    def clock(self) -> float:
+        """Process time at control 0; a run that chooses its own time steps sets it before each step."""
+        return float(self._time[0].value)
+
+    @clock.setter
+    def clock(self, time: float) -> None:
+        self._time[0].value = time
+
+    def time_at(self, control: float) -> float:
+        """Return the process time at a control, for the current step data (`StepData`)."""
+        base, rate = self._time
+        return float(base.value + rate.value * control)
+
+    @property
+    def time_now(self) -> float:
+        """Process time at the current control of the forms."""
+        return self.time_at(float(self.control.value))
+
+    def set_loads(self, setting: Any) -> None:
+        """Set loads, elastic supports and process time as functions of the control, from step data (`StepData`)."""
+        for support, factor in self.elastic_supports:
+            factor.value = float(not any(self.scene.items[i] is support for i in setting.inactive))
+        for i, (load, base, rate) in enumerate(self._loads):
+            active = i not in setting.inactive
+            base.value = active * (setting.base[i] if load.driven else load.value)
+            rate.value = active * setting.rate[i]
+        for constant, value in zip(self._time, (setting.base[-1], setting.rate[-1])):
+            constant.value = value
 
     def refresh(self) -> None:
         """Update the integrals over past states (K-BKZ materials) after a change of fields or time."""
@@ -247,3 +320,57 @@ class Formulation(ControlledLoads):
     def area(self, boundary: str) -> Any:
         """Return the scalar form of the reference area of a boundary (UFL, rank 0)."""
         return self.scene.kinematics.weight(self.X) * self.face(boundary, 2)[1]
+
+    @abstractmethod
+    def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
+        """Return the outward reference normal (UFL, shape (2,)) and the measure of a boundary on which a load acts."""
+
+    @abstractmethod
+    def constraints(self, support: Any) -> list[Any]:
+        """Return the `Constrained` and `ConstrainedMean` that a support imposes on the displacement field."""
+
+    @abstractmethod
+    def nearest(self, points: np.ndarray) -> np.ndarray:
+        """Return the points on the mesh of the fields for points of the body, shape (n, 2), length.
+
+        For a solid they are the points themselves, for a membrane those of the mid-surface at the same R.
+        """
+
+    @abstractmethod
+    def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
+        """Return the integral of a density (UFL scalar) over the reference volume of layers; per depth in plane strain.
+
+        metadata: of the UFL measure; None: the scene's quadrature.
+        """
+
+    @abstractmethod
+    def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
+        """Return the heights at which functions of the position are evaluated in a layer, shape (n,), length.
+
+        For a solid they are Z. For a membrane, the mid-surface of all layers, they lie halfway between the layer's
+        faces.
+        """
+
+    @abstractmethod
+    def _make_mesh(self) -> Any:
+        """Return the `Mesh` of the fields."""
+
+    @abstractmethod
+    def _elements(self, cell: Any) -> tuple[Any, list[Any]]:
+        """Return the scalar element of a displacement component, and the elements of all fields."""
+
+    @abstractmethod
+    def _groups(self) -> list[tuple[Any, list[str]]]:
+        """Return a list of (material, names of its layers), one for each term of the energy."""
+
+    @abstractmethod
+    def _weight(self) -> Any:
+        """Return the reference volume per measure `dx` of the mesh (UFL scalar), such as 2 pi R."""
+
+    @abstractmethod
+    def _deformation_gradient(self) -> Any:
+        """Return the deformation gradient (UFL, shape (3, 3))."""
+
+    @abstractmethod
+    def _energy(self, density: Any) -> Any:
+        """Return the integral over the body of density(`MaterialTerms`, F) (stress), over stress times volume (UFL)."""
