@@ -177,6 +177,56 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
     return file
 
 
+class CFunctions:
+    """Functions of a C file of the package, as attributes; the file is compiled when one is first used.
+
+    An argument is a number, an array, or None for no array. An array is copied if it is not contiguous or of another
+    type, except where C writes into it: there it must be contiguous, of floats or of integers (long in C).
+
+    Args:
+        file: path of the C file within the package. Files that it includes by "..." belong to the package, too.
+    """
+
+    def __init__(self, file: str):
+        self._file = Path(__file__).parent / file
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        if "_opened" not in vars(self):
+            for found, function in self._compiled().items():
+                setattr(self, found, function)
+        return self.__getattribute__(name)
+
+    def _compiled(self) -> dict[str, Any]:
+        """Compile the file, and return {name: function} of its functions that are not static."""
+        ffi, code = cffi.FFI(), _with_included(self._file)
+        heads = re.findall(r"^((?!static|typedef)\w+ (\w+)\(([^)]*)\))\s*\{", code, re.M)
+        ffi.cdef("".join(head + ";" for head, _, _ in heads))
+        self._opened = ffi.dlopen(str(library(self._file.stem, code, ("-O3", "-ffp-contract=off"))))
+        return {name: _taking_arrays(getattr(self._opened, name), arguments.split(","))
+                for _, name, arguments in heads}
+
+
+def _with_included(file: Path) -> str:
+    """Return the text of a C file with the files in place that it includes by "..."."""
+    return re.sub(r'^#include "(.+)"$', lambda found: _with_included(file.parent / found[1]), file.read_text(),
+                  flags=re.M)
+
+
+def _taking_arrays(function: Any, arguments: list[str]) -> Any:
+    """Return a C function that takes arrays; arguments: their declarations in C."""
+    kinds = [None if "*" not in a else ("const" in a, *((_DOUBLES, float) if "double" in a else (_LONGS, int)))
+             for a in arguments]
+
+    def call(*values: Any) -> Any:
+        return function(*[
+            value if kind is None else NULL if value is None else
+            from_buffer(kind[1], np.ascontiguousarray(value, kind[2]) if kind[0] else value)
+            for kind, value in zip(kinds, values, strict=True)])
+    return call
+
+
 @functools.cache
 def functions(name: str, header: str, code: str) -> Any:
     """Return an object of functions in C, compiled at the first call; RuntimeError if that fails."""

@@ -177,3 +177,14 @@ with tempfile.TemporaryDirectory() as folder:
 
 def test_one_rank_compiles():
     assert sorted(run_script(RANKS, ranks=2).splitlines()) == ["0 1 0.5", "1 0 0.5"]
+
+
+def test_arrays_for_functions_in_c():
+    """Inputs are copied if they are not contiguous; an array into which C writes must be contiguous."""
+    edges, low, high = _jit.CFunctions("mesh/boxes.c"), np.zeros((4, 2)), np.ones((2, 4)).T
+    pairs = np.full((6, 2), -1)
+    assert edges.overlaps(4, low, high, 6, pairs) == 6 and pairs.min() == 0
+    with pytest.raises(ValueError, match="not C-contiguous"):
+        edges.overlaps(4, low, high, 6, np.full((2, 6), -1).T)
+    with pytest.raises(AttributeError):
+        _ = edges.no_such_function

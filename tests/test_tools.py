@@ -355,10 +355,9 @@ class TestNearest:
 def test_no_compiler(tmp_path, monkeypatch):
     """A compiler that fails says so; nothing is left behind for the next run."""
     from formingx import _jit
-    from formingx.tools import nearest
 
     def compiled():
-        return _jit.functions.__wrapped__("nearest", nearest._HEADER, nearest.SOURCE)
+        return _jit.CFunctions("tools/nearest.c").nearest
     monkeypatch.setattr(_jit, "_compiler", lambda: ("false",))
     monkeypatch.setattr(_jit.jit, "get_options", lambda: {"cache_dir": tmp_path})
     with pytest.raises(RuntimeError, match="the C compiler failed, with status 1: false"):

@@ -4,10 +4,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .._jit import address, address_of_integers
-from .compiled import compiled
+from .._jit import CFunctions
 from .nodes import MAX_COMPARED
 
+_C = CFunctions("mesh/boxes.c")
 _CHUNK = 2**18      # pairs that are compared at a time
 
 
@@ -20,7 +20,7 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
         pairs, count = np.empty((0, 2), dtype=int), 8 * len(low)
         while len(pairs) < count:
             pairs = np.empty((count, 2), dtype=int)
-            count = compiled().overlaps(len(low), address(low), address(high), count, address_of_integers(pairs))
+            count = _C.overlaps(len(low), low, high, count, pairs)
         if len(low) > 1:
             yield pairs[:count, 0], pairs[:count, 1]
         return

@@ -4,12 +4,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from .._jit import address, address_of_integers
+from .._jit import CFunctions
 from ..errors import InputError
 from ..values.tolerances import FAR, ROUND_OFF
 from .boxes import overlapping
-from .compiled import compiled
 from .edges import edges_of
+
+_C = CFunctions("mesh/check.c")
 
 
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
@@ -135,8 +136,7 @@ def crossing_edges(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray
     tolerance = ROUND_OFF * float((high - low).max())
     for first, second in overlapping(low - tolerance, high + tolerance):
         crosses = np.zeros(len(first))
-        compiled().cross(len(first), address_of_integers(first), address_of_integers(second), address(points),
-                         address_of_integers(edges), address(crosses))
+        _C.cross(len(first), first, second, points, edges, crosses)
         if crosses.any():
             yield np.column_stack([first, second])[crosses > 0]
 

@@ -7,11 +7,12 @@ from typing import Any, Self
 
 import numpy as np
 
-from .._jit import NULL, address
+from .._jit import CFunctions
 from ..tools.shapes import Nearest
 from ..tools.tool import PlaneTool
-from .compiled_penalty import compiled
 from .contact_law import ContactHistory, ContactLaw, Motion, NormalLaw, Tractions, outer
+
+_C = CFunctions("physics/penalty.c")
 
 STICKS = 100.0
 """Coefficient of friction from which on a point counts as sticking."""
@@ -52,7 +53,6 @@ class Law(NormalLaw):
         self.elastic_slip, self.adhesive = elastic_slip, adhesive
         self._set_friction(mu)
         self._slid: tuple[Nearest, ContactHistory, tuple] | None = None      # last geometry and history, and their slip
-        self._past: tuple[ContactHistory, list] | None = None                # last history, and addresses of its arrays
         self._constants: tuple | None = None
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
@@ -68,15 +68,14 @@ class Law(NormalLaw):
         self.has_history = self.has_friction or self.adhesive
 
     def _with(self, **other: Any) -> Self:
-        return super()._with(_constants=None, _past=None, **other)
+        return super()._with(_constants=None, **other)
 
     def _given(self) -> tuple:
         """Return the constants of the law as arguments of the C function `tractions`, stored for repeated calls."""
         if self._constants is None:
             flags = (self.adhesive, self.has_friction, self._slides)
-            each = [(np.array(value, dtype=float, ndmin=1), np.ndim(value)) for value in (self.k, self.mu)]
-            self._constants = (address(np.array([self.theta, self.elastic_slip, *flags, STICKS])),
-                               *(argument for value, stride in each for argument in (address(value), stride)))
+            self._constants = (np.array([self.theta, self.elastic_slip, *flags, STICKS]),
+                               self.k, np.ndim(self.k), self.mu, np.ndim(self.mu))
         return self._constants
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
@@ -97,8 +96,7 @@ class Law(NormalLaw):
         separation F is max(d + theta, 0), and d + theta at `bonded` points, which may be negative (tension).
         """
         F, slope = np.empty(len(d)), np.empty(len(d))
-        mask = NULL if bonded is False else address(bonded)
-        compiled().ramp(len(d), self.theta, self.adhesive, address(d), mask, address(F), address(slope))
+        _C.ramp(len(d), self.theta, self.adhesive, d, None if bonded is False else bonded, F, slope)
         return F, slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:
@@ -169,21 +167,18 @@ class Law(NormalLaw):
         each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each).
         """
         near, out = self.nearest(x), np.empty(12 * len(x))
-        before, g, dg, limit, grows = NULL, NULL, NULL, NULL, NULL
-        if old is not None:
-            before = self._addresses(old)[1]
+        g = dg = limit = grows = None
         if self.has_friction:
             assert old is not None
-            g, dg = (address(a) for a in self._slip(x, near, old))
+            g, dg = self._slip(x, near, old)
             if self.shear_limit is not None:
                 centre = near.distance if expected is None else expected.distance
                 mu = self.mu if self._slides else np.where(self.sticks, 0.0, self.mu)
                 found = self.shear_limit(self.k * self.ramp(centre, self._bonded(old))[0], mu)
-                limit, grows = (address(np.broadcast_to(a, len(x))) for a in found)
-        ahead = (NULL, NULL) if expected is None else (address(expected.distance), address(expected.slip))
-        compiled().tractions(len(x), *self._given(), address(near.distance), address(near.normal),
-                             address(near.curvature), before, g, dg, *ahead, NULL if sense is None else address(sense),
-                             limit, grows, address(out))
+                limit, grows = (np.broadcast_to(a, len(x)) for a in found)
+        ahead = (None, None) if expected is None else (expected.distance, expected.slip)
+        _C.tractions(len(x), *self._given(), near.distance, near.normal, near.curvature,
+                     None if old is None else old.distance, g, dg, *ahead, sense, limit, grows, out)
         return out
 
     def hoop_stiffness(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
@@ -233,19 +228,9 @@ class Law(NormalLaw):
         """
         if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
             g, dg = np.empty(len(x)), np.empty((len(x), 2))
-            compiled().elastic_slips(len(x), self.theta, address(x), address(near.normal), address(near.curvature),
-                                     *self._addresses(old), address(g), address(dg))
+            _C.elastic_slips(len(x), self.theta, x, near.normal, near.curvature, *old, g, dg)
             self._slid = near, old, (g, dg)
         return self._slid[2]
-
-    def _addresses(self, old: ContactHistory) -> list:
-        """Return the addresses of the four arrays of the history variables `old`.
-
-        The result is stored for repeated calls with the same object `old`.
-        """
-        if self._past is None or self._past[0] is not old:
-            self._past = old, [address(values) for values in old]
-        return self._past[1]
 
 
 def symmetric_stiffness(law: ContactLaw, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:

@@ -8,15 +8,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from .._jit import address
+from .._jit import CFunctions
 from ..errors import InputError, as_list, as_points, check_type, finite, non_negative, pair
 from ..mesh.boxes import overlapping
 from ..values.tolerances import ROUND_OFF
-from .nearest import nearest
 from .pieces import (
     TURN,
     Arc,
@@ -29,6 +28,8 @@ from .pieces import (
     turn_angle,
     with_polyline,
 )
+
+_C = CFunctions("tools/nearest.c")
 
 
 class Nearest(NamedTuple):
@@ -66,7 +67,9 @@ class Tool:
         pieces: lines and arcs in their order along the profile.
         closed: True if the last point is the first.
         size: largest extent of the profile, or its largest arc radius if that is larger, length.
-        table: numbers of the pieces for `formingx.tools.nearest.nearest`, lines first, shape (pieces, 9).
+        table: numbers of the pieces for functions in C, lines first, shape (pieces, 9). A line has origin, direction,
+            0, lowest and highest length, 0, 0. An arc has centre, 0, 0, sense (1: left), 0, angle, radius, first polar
+            angle.
         lines: number of lines.
         sized: False for a plane, which is a single line and has no end.
 
@@ -159,16 +162,15 @@ class Tool:
             Distances, positive inside the tool, shape (n,), length; gradients, shape (n, 2); curvatures, shape (n,),
             1/length.
         """
-        return Nearest(*nearest(as_points("Tool: x", x), self.table, self.lines))
+        x = as_points("Tool: x", x)
+        n = len(x)
+        distance, normal, curvature = np.empty(n), np.empty((n, 2)), np.empty(n)
+        _C.nearest(n, x, len(self.table), self.lines, self.table, distance, normal, curvature)
+        return Nearest(distance, normal, curvature)
 
     @property
     def sized(self) -> bool:
         return len(self.pieces) > 1 or isinstance(self.pieces[0], Arc)
-
-    @property
-    def compiled_table(self) -> tuple[int, int, Any]:
-        """Number of rows of `table`, number of lines among them, and address of `table`, for functions in C."""
-        return len(self.table), self.lines, address(self.table)
 
     def moved(self, r: float = 0.0, z: float = 0.0) -> Tool:
         """Return the tool shifted in its plane.

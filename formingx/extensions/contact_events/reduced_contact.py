@@ -26,11 +26,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from mpi4py import MPI
 
-from ..._jit import address, address_of_integers
+from ..._jit import CFunctions
 from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
 from ...values.tolerances import FAR
-from .compiled_contact import compiled
 from .gap_closure import GapClosure
 from .response import BodyResponse
 
@@ -58,7 +57,7 @@ class StatusSearch:
 
 _SEARCH = StatusSearch()
 _VALUES = np.array(astuple(_SEARCH), dtype=float)
-_ADDRESS = address(_VALUES)
+_C = CFunctions("extensions/contact_events/reduced_contact.c")
 
 
 class ToolFrame(NamedTuple):
@@ -213,14 +212,13 @@ class CondensedPoints:
             found = self._frame_by_arrays(positions, own)
         else:
             found, (table, ranges) = np.empty(6 * k), self._profiles
-            compiled().frame(k, address(positions), address_of_integers(self._rows), address(own),
-                             address(self._properties), address_of_integers(ranges), address(table), address(found))
+            _C.frame(k, positions, self._rows, own, self._properties, ranges, table, found)
         normal, tangent = found[: 2 * k].reshape(k, 2), found[2 * k: 4 * k].reshape(k, 2)
         return ToolFrame(*map(self._of_all_ranks, (normal, tangent, found[4 * k: 5 * k], found[5 * k:])))
 
     @cached_property
     def _profiles(self) -> tuple[np.ndarray, np.ndarray] | None:
-        """Profiles of all tools, shape (pieces, 9), as `formingx.tools.nearest.nearest` takes them; None if not used.
+        """Profiles of all tools, shape (pieces, 9), as `Tool.table` has them; None if not used.
 
         The second array, shape (n, 3), has the first piece of each point's tool and its numbers of pieces and of lines.
         """
@@ -265,9 +263,8 @@ class CondensedPoints:
         (sliding). All shapes (m, 2), length for motions; status (`ContactStatus`): (m,). Without F: `force` and NaN.
         """
         F, outside = np.empty(force.shape), np.empty(force.shape)
-        good = compiled().forces_at_end(
-            *self._arguments(near), address(self.elastic_slip), address(near.beyond), address(u),
-            address_of_integers(status), address(force), address(to), _ADDRESS, address(F), address(outside))
+        good = _C.forces_at_end(*self._arguments(near), self.elastic_slip, near.beyond, u, status, force, to, _VALUES,
+                                F, outside)
         return (F, outside) if good else (force, np.full(force.shape, np.nan))
 
     def rates(self, u: np.ndarray, status: np.ndarray, near: ToolFrame,
@@ -281,9 +278,9 @@ class CondensedPoints:
         slack = (status != ContactStatus.FREE) & ~self._pulls
         F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]
         slack &= np.abs(N).max(initial=0.0) * _SEARCH.limit_tolerance >= N
-        given = *self._arguments(near), address(u), address(force), address_of_integers(status), _ADDRESS
+        given = *self._arguments(near), u, force, status, _VALUES
         for found in (np.array(status, dtype=int), np.where(slack, ContactStatus.FREE, status).astype(int)):
-            if compiled().rates(*given, address_of_integers(found), address(F), address(outside)):
+            if _C.rates(*given, found, F, outside):
                 return F, outside, found
         return None
 
@@ -294,14 +291,12 @@ class CondensedPoints:
         Forces, shape (m, 2), change linearly by `rate`; infinite without a change. status: `ContactStatus`, shape (m,).
         """
         changed, after = np.zeros(2, dtype=int), np.array(status, dtype=int)
-        s = compiled().change(*self._arguments(near), address_of_integers(status), address(force), address(rate),
-                                 _ADDRESS, address_of_integers(changed))
+        s = _C.change(*self._arguments(near), status, force, rate, _VALUES, changed)
         if s < np.inf:
             after[changed[0]] = changed[1]
         return s, after
 
     def _arguments(self, near: ToolFrame) -> tuple:
-        """Return m and addresses of friction, adhesion, S, C, normals and curvatures for the C functions."""
-        return (len(self.friction), address(self.friction), address(self._pulls), address(self._S), address(self._C),
-                address(near.normal), address(near.curvature))
+        """Return m, friction, adhesion, S, C, normals and curvatures, the first arguments of the C functions."""
+        return len(self.friction), self.friction, self._pulls, self._S, self._C, near.normal, near.curvature
 

@@ -1,25 +1,5 @@
-"""Equations of the penalty law at contact points, computed in C.
-
-Contact evaluates its law thousands of times in a run, at few points each time. Array operations would cost more than
-the arithmetic. The functions are compiled once, into the cache folder of compiled forms.
-"""
-
-from __future__ import annotations
-
-from typing import Any
-
-from .._jit import functions
-
-_HEADER = """
-void ramp(long, double, long, const double *, const double *, double *, double *);
-void elastic_slips(long, double, const double *, const double *, const double *, const double *, const double *,
-                   const double *, const double *, double *, double *);
-void tractions(long, const double *, const double *, long, const double *, long, const double *, const double *,
-               const double *, const double *, const double *, const double *, const double *, const double *,
-               const double *, const double *, const double *, double *);
-"""
-
-_SOURCE = r"""
+/* Penalty law at contact points: `Law` in penalty.py has its equations. A run evaluates it thousands of times, at few
+   points each time. */
 #include <math.h>
 
 enum {THETA, ELASTIC_SLIP, PULLS, FRICTION, SLIDES, STICKS};
@@ -115,10 +95,3 @@ void tractions(long points, const double *law, const double *k, long k_step, con
         resistance[i] = s;
     }
 }
-"""
-
-
-def compiled() -> Any:
-    """Compile `ramp`, `elastic_slips` and `tractions` of `formingx.physics.penalty.Law` in C, once.
-    Arrays are passed by their addresses."""
-    return functions("penalty", _HEADER, _SOURCE)

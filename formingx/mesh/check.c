@@ -1,38 +1,5 @@
-"""Searches for overlapping boxes and for crossing edges, computed in C.
-
-A run tests the boundary of the body for self-intersection in each state.
-"""
-
-from __future__ import annotations
-
-from typing import Any
-
-from .._jit import functions
-
-_HEADER = """
-long overlaps(long, const double *, const double *, long, long *);
-void cross(long, const long *, const long *, const double *, const long *, double *);
-"""
-
-_SOURCE = r"""
+/* Search for crossing edges. A run tests the boundary of the body for self-intersection in each state. */
 #include <math.h>
-
-/* number of pairs (i < j) of boxes that overlap or touch; the first `most` are written to `pairs` */
-long overlaps(long n, const double *low, const double *high, long most, long *pairs)
-{
-    long found = 0;
-    for (long i = 0; i < n; i++)
-        for (long j = i + 1; j < n; j++) {
-            const double *a = low + 2 * i, *b = high + 2 * i, *c = low + 2 * j, *d = high + 2 * j;
-            if (!(a[0] <= d[0] && c[0] <= b[0] && a[1] <= d[1] && c[1] <= b[1])) continue;
-            if (found < most) {
-                pairs[2 * found] = i;
-                pairs[2 * found + 1] = j;
-            }
-            found++;
-        }
-    return found;
-}
 
 static double turn(const double *a, const double *b, const double *c)
 {
@@ -64,9 +31,3 @@ void cross(long pairs, const long *first, const long *second, const double *poin
                 || (apart[2] && on(c, a, b)) || (apart[3] && on(d, a, b));
     }
 }
-"""
-
-
-def compiled() -> Any:
-    """Return C functions: `overlaps` of boxes, and `cross` of edges off common nodes, with their indices."""
-    return functions("mesh", _HEADER, _SOURCE)

@@ -1,18 +1,5 @@
-"""Closest points of a profile of lines and arcs, computed in C.
-
-Contact queries its tools thousands of times in a run, for few points each time. Array operations would cost more than
-the arithmetic. The function is compiled once, into the cache folder of compiled forms.
-"""
-
-from __future__ import annotations
-
-import numpy as np
-
-from .._jit import address, functions
-
-_HEADER = "void nearest(long, const double *, long, long, const double *, double *, double *, double *);"
-
-SOURCE = r"""
+/* Closest points of a profile of lines and arcs. Contact queries its tools thousands of times in a run, for few points
+   each time. A table has the pieces in rows, lines first, as `Tool.table` in profile.py. */
 #include <math.h>
 
 enum {R, Z, ALONG_R, ALONG_Z, SIGN, LOW, HIGH, RADIUS, START, COLUMNS};
@@ -61,19 +48,3 @@ void nearest(long points, const double *x, long pieces, long lines, const double
         normal[1] = p[ALONG_R] + curvature[i] * v;
     }
 }
-"""
-"""Definitions in C, of which other functions in C make use (`formingx.contact.gap_closures`)."""
-
-
-def nearest(x: np.ndarray, table: np.ndarray, lines: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return distances from a profile, (n,), gradients, (n, 2), curvatures of level lines, (n,), at x, (n, 2).
-
-    Distances are positive inside. The table has m pieces, `lines` first, shape (m, 9). A line has origin, direction, 0,
-    lowest and highest length, 0, 0. An arc has centre, 0, 0, sense (1: left), 0, angle, radius, first polar angle.
-    """
-    n = len(x)
-    found = np.empty(4 * n)
-    out = address(found)
-    functions("nearest", _HEADER, SOURCE).nearest(n, address(x), len(table), lines, address(table), out, out + n,
-                                                   out + 3 * n)
-    return found[:n], found[n:3 * n].reshape(n, 2), found[3 * n:]

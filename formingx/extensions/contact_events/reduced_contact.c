@@ -1,28 +1,6 @@
-"""Equations of reduced contact (`reduced_contact`), computed in C.
-
-The prediction of contact events solves them hundreds of times in a run, for few points each time. Array operations
-would cost more than the arithmetic. The functions are compiled once, into the cache folder of compiled forms.
-"""
-
-from __future__ import annotations
-
-from typing import Any
-
-from ..._jit import functions
-from ...tools.nearest import SOURCE
-
-_POINTS = "long, const double *, const double *, const double *, const double *, const double *, const double *"
-"""Arguments for the C structure `Points`: m, friction, pulls, S, C, normals, curvatures."""
-
-_HEADER = f"""
-int forces_at_end({_POINTS}, const double *, const double *, const double *, const long *, const double *,
-                  const double *, const double *, double *, double *);
-int rates({_POINTS}, const double *, const double *, const long *, const double *, long *, double *, double *);
-double change({_POINTS}, const long *, const double *, const double *, const double *, long *);
-void frame(long, const double *, const long *, const double *, const double *, const long *, const double *, double *);
-"""
-
-_SOURCE = SOURCE + r"""
+/* Frictional contact of a few points, condensed onto their contact forces: reduced_contact.py has the equations. The
+   prediction of contact events solves them hundreds of times in a run, for few points each time. */
+#include "../../tools/nearest.c"
 #include <stdlib.h>
 #include <string.h>
 
@@ -340,9 +318,3 @@ void frame(long m, const double *positions, const long *rows, const double *forc
         out[5 * m + i] = depth - (distance - p[SHIFT]);
     }
 }
-"""
-
-
-def compiled() -> Any:
-    """Return an object with the C functions `forces_at_end`, `rates`, `change` and `frame` for m contact points."""
-    return functions("reduced_contact", _HEADER, _SOURCE)
