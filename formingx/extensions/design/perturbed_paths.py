@@ -89,7 +89,7 @@ class _PerturbedPaths:
                 self._solve_at(state, before, last)
             if history:
                 for run in self.runs:
-                    run.problem.advance(run.x, run.control)
+                    run.advance()
                 self._copy_contact_status(state)
             before = state
         if states[-1].target is None:
@@ -137,6 +137,8 @@ class _PerturbedPaths:
                                                         clocked=not p.prescribes_quantity)
             problem.enter(replace(setting, base=base, rate=rate), x, control)
             run.control = control
+            if started:
+                run.begin_step()
 
     def _solve_at(self, state: State, before: State, last: bool) -> None:
         """Solve for the perturbed runs at a state of the base run; `last` if a stage or piece ends there."""

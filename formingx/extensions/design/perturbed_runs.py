@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -61,6 +61,13 @@ class PerturbedRunFailure(Failure):
     """
 
 
+class _Start(NamedTuple):
+    """State at the start of a step (`formingx.forms.history.Start`)."""
+
+    x: np.ndarray
+    control: float
+
+
 class PerturbedRun:
     """Problem and present state of one perturbed run, a copy of the base run with one parameter slightly changed.
 
@@ -96,6 +103,18 @@ class PerturbedRun:
         self.control, self.history_variables = 0.0, self.problem.history_variables
         self.plans: list[Any] = []
         self.piece_end = 0.0
+        self._start: _Start | None = None
+
+    def begin_step(self) -> None:
+        """Store the present state as the start of the next step."""
+        self._start = _Start(self.x, self.control)
+
+    def advance(self) -> None:
+        """Update the history variables at the end of a step, as a run does: heat needs the start of the step, too."""
+        if self._start is not None:
+            self.problem.predict(self._start, self.x, self.control)
+        self.problem.advance(self.x, self.control)
+        self.begin_step()
 
     def state(self, base: State) -> State:
         """Return the present state as a `State`, with tangent, stage and kind of the base state."""
