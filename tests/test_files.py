@@ -177,6 +177,16 @@ def test_animation(formed, tmp_path):
         formed.animate(tmp_path / "run.avi")
 
 
+@pytest.mark.parametrize("kinematics, left, image", [
+    (fx.Axisymmetric(), fx.Symmetry("axis"), True), (fx.PlaneStrain(), fx.Symmetry("axis"), True),
+    (fx.PlaneStrain(), fx.Clamped("axis"), False)])
+def test_an_animation_draws_a_mirror_image_of_halves_and_rings_alone(kinematics, left, image):
+    """A plane-strain sheet that is held at r = 0 is the whole part."""
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=0.5),
+                     kinematics=kinematics, supports=[left, fx.Clamped("rim")], loads=[fx.Pressure("bottom")])
+    assert animation.has_image_at_axis(scene) == image
+
+
 def test_an_animation_of_a_tall_part_is_narrow(tmp_path):
     mesh = fx.mesh.parison(inner_radius=10.0, thickness=2.0, length=130.0, elements=(20, 1))
     scene = fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("inner")],

@@ -39,10 +39,10 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
         now.append((names, [a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in names]))
         tools.append(tooling.placed(tooling.travels(interpolated.setting, interpolated.control)))
     curves = {names: path.curve(*names) for names in shown.values()}
-    axisymmetric = path.problem.scene.kinematics.dimension_of_volume == 3
+    both_sides = has_image_at_axis(path.problem.scene)
 
     def draw():
-        pictures = _draw(shapes, tools, now, curves, axisymmetric, units)
+        pictures = _draw(shapes, tools, now, curves, both_sides, units)
         save = _save_gif if file.suffix.lower() == ".gif" else _save_mp4
         files.replace(file, lambda stream: save(pictures, seconds, stream), "wb")
     files.on_root(path.problem.comm, draw)
@@ -60,6 +60,12 @@ def _ffmpeg() -> str | None:
         return str(imageio_ffmpeg.get_ffmpeg_exe())
     except RuntimeError:                                     # a package without the program
         return None
+
+
+def has_image_at_axis(scene: Any) -> bool:
+    """Return True if the part has a mirror image at r = 0: a ring, or a half with its mirror plane there."""
+    ring = scene.kinematics.dimension_of_volume == 3
+    return ring or any(plane.axis == 0 and abs(plane.position) <= scene.symmetry.near for plane in scene.symmetry.planes)
 
 
 def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
@@ -94,8 +100,8 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
     return found
 
 
-def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool, units: Units) -> list[Any]:
-    """Return the frames of the animation as images.
+def _draw(shapes: list, tools: list, now: list, curves: dict, both_sides: bool, units: Units) -> list[Any]:
+    """Return the frames of the animation as images; `both_sides` draws the mirror image at r = 0, too.
 
     `tools` has (tool, displacement (2,)) of active tools and `now` ((x, y) columns, their values) in each frame;
     `curves` maps (x, y) to values (m,) each.
@@ -104,9 +110,8 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
     from PIL import Image
-    r = np.concatenate([s.bottom[:, 0] for s in shapes])
-    sides = (1, -1) if axisymmetric or abs(r.min()) < 1e-9 * r.max() else (1,)
-    low, high = plots.span(shapes, mirrored=len(sides) == 2)
+    sides = (1, -1) if both_sides else (1,)
+    low, high = plots.span(shapes, mirrored=both_sides)
     ratios = [s.wall_ratio for s in shapes]
     colours = Normalize(min(r.min() for r in ratios), max(r.max() for r in ratios))
     wide = float(np.clip(3.5 * (high - low)[0] / (high - low)[1] + 1.4, 2.8, 6.0))    # a bottle fills its panel, too
@@ -119,7 +124,7 @@ def _draw(shapes: list, tools: list, now: list, curves: dict, axisymmetric: bool
         sheet.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), xlabel=units.label("r"), ylabel=units.label("z"),
                   aspect="equal")
         sheet.spines[["top", "right"]].set_visible(False)
-        figures.tools(sheet, tool, low, high, mirror=len(sides) == 2)
+        figures.tools(sheet, tool, low, high, mirror=both_sides)
         for side in sides:
             plots.section(sheet, shape, (side, 1), colormaps["viridis_r"](colours(ratio)))
         _curve(loading, names, curves[names], point, units)
