@@ -242,15 +242,9 @@ def _watch(options: argparse.Namespace) -> None:
 
 
 def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
-    """Return the two parts of the value OURS=THEIRS of an option.
+    """Return the two parts of the value OURS=THEIRS of an option; another form is an InputError.
 
-    Args:
-        option: name of the option, for error messages.
-        word: the value.
-        both: True if both parts are needed; otherwise OURS alone gives (OURS, "").
-
-    Raises:
-        InputError: the option has another form.
+    both: True if both parts are needed; otherwise OURS alone gives (OURS, "").
     """
     ours, equals, theirs = word.partition("=")
     if not ours or (equals or both) and not theirs:

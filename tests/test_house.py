@@ -112,6 +112,31 @@ def test_no_class_name_is_defined_twice():
     assert {name for name, n in names.items() if n > 1} == set()
 
 
+INTERNAL = ("solve", "contact", "forms", "problem", "extensions.contact_events")
+MET_BY_USERS = {"LoadedBody", "Face", "Diagnosis"}          # in these rooms: arguments of a user's functions, results
+
+
+def test_docstrings_of_internals_are_no_longer_than_their_code():
+    """Unless they state an equation; interfaces (`Protocol`, abstract methods) have no code."""
+    long = set()
+
+    def visit(file, node, owner):
+        for n in ast.iter_child_nodes(node):
+            if isinstance(n, ast.FunctionDef) and (said := ast.get_docstring(n, clean=False)) is not None:
+                lines = said.count("\n") + 1
+                first = min([n.lineno, *(d.lineno for d in n.decorator_list)])
+                interface = "Protocol" in owner or "abstract" in ast.dump(n) or "NotImplementedError" in ast.dump(n)
+                hidden = n.name.startswith("_") and not n.name.startswith("__") or (
+                    name_of(file).startswith(INTERNAL) and not MET_BY_USERS & set(owner))
+                if hidden and not interface and ".. math" not in said and lines > n.end_lineno - first + 1 - lines:
+                    long.add((name_of(file), n.name))
+            bases = [n.name, *(getattr(b, "id", "") for b in n.bases)] if isinstance(n, ast.ClassDef) else owner
+            visit(file, n, bases)
+    for file in FILES:
+        visit(file, tree_of(file), [])
+    assert long == set()
+
+
 def members(tree):
     """Names in the class bodies of `solve/equations.py`."""
     return {getattr(n, "name", None) or n.target.id for c in ast.walk(tree) if isinstance(c, ast.ClassDef)

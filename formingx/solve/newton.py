@@ -98,27 +98,17 @@ class Tolerances:
                   smooth: bool = False) -> bool:
         """Return True if an iteration has converged, to its tolerances or to round-off.
 
-        One of these conditions must hold. A value no longer decreases if it is above 0.3 times the value before.
-
-        * The correction predicted for the next iteration and the residual are below their tolerances.
-        * The last correction is below its tolerance, and the residual no longer decreases. In a thin sheet (radius over
-          thickness 1e6) a stiff penalty times the round-off of displacements can exceed the support forces.
+        * The correction predicted for the next iteration and the residual are below their tolerances. After a chord
+          iteration only this counts.
+        * The last correction is below its tolerance, and the residual no longer decreases (by a factor 0.3): in a thin
+          sheet a stiff penalty times the round-off of displacements can exceed the support forces.
         * The residual is below 1000 times its tolerance. The last correction is below 1e-11, or it is below 1e-7 and no
           longer decreases.
-        * F is `smooth`. In the last five iterations corrections were below 1e-8, and residuals differed by less than a
-          factor of 3.
+        * F is `smooth`, without kinks. In the last five iterations corrections were below 1e-8, and residuals differed
+          by less than a factor of 3.
 
-        After a chord iteration only the first condition counts.
-
-        Args:
-            corrections: corrections of all iterations so far, ``|dx|/(|x| + Newton.displacement_floor)``.
-            residuals: residuals before each iteration and after the last one, ``|F|/(|support forces| + floor)``.
-            chord: True if the last iteration was a chord iteration. Its convergence is linear: the next correction is
-                predicted from the last ratio of residuals or corrections, and doubled.
-            smooth: True if F has no kinks, between which an iteration could oscillate.
-
-        Returns:
-            True if no further iteration is needed.
+        corrections: ``|dx|/(|x| + Newton.displacement_floor)`` of all iterations so far. residuals: ``|F|/(|support
+        forces| + floor)`` before each iteration and after the last one.
         """
         if not corrections:
             return False
@@ -126,7 +116,7 @@ class Tolerances:
         if chord:
             if residual == 0:                                # in the unloaded reference configuration
                 return True
-            ahead = 2 * last * max(residual / residuals[-2], last / before)
+            ahead = 2 * last * max(residual / residuals[-2], last / before)     # linear convergence, doubled
             return ahead < self.correction and residual < self.residual
         ahead = last * min(1.0, last / before) ** 2
         if ahead < self.correction and residual < self.residual:

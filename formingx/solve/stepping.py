@@ -66,21 +66,13 @@ class StepControl:
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
         """Adapt the step length after a converged step of full length (Song 1993, eq. 4.21).
-
-        Args:
-            iterations: number of Newton iterations of the step with a new tangent.
-            error: time integration error of the step over its tolerance.
-        """
+        `error`: time integration error of the step over its tolerance."""
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
         factor = min(factor, 0.9 * max(error, 1e-9) ** (-1 / 3))
         self.length = min(self.length * factor, self.largest)
 
     def failed(self) -> bool:
-        """Halve the step length after a failed step.
-
-        Returns:
-            False if the length is then below `smallest`.
-        """
+        """Halve the step length after a failed step; return False if it is then below `smallest`."""
         self.length /= 2
         return self.length >= self.smallest
 

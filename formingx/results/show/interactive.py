@@ -61,11 +61,7 @@ def data(records: list[ReportData], names: list[str], units: Units, attempts: At
 
 
 def _finite_of(draw: Callable[[], Any]) -> Any:
-    """Return the data of a drawing that a function makes.
-
-    Raises:
-        ValueError: a number is not finite.
-    """
+    """Return the data of a drawing that a function makes; raise `ValueError` if a number is not finite."""
     content = draw()
     json.dumps(content, allow_nan=False)
     return content

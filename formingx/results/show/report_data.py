@@ -256,13 +256,9 @@ def of_path(path: Any) -> ReportData:
 
 
 def _fields_of(path: Any, drawn: Any, last: Profile, done: Callable[[float], Any]) -> list[dict[str, np.ndarray]]:
-    """Return the fields of each state of a run (`ReportData.fields`); collective.
+    """Return the fields of each state of a path (`ReportData.fields`); collective.
 
-    Args:
-        path: the `Path`.
-        drawn: numbers of the drawn states.
-        last: profile of the sheet in the last state.
-        done: function that is called with the fraction of the states that is done.
+    drawn: numbers of the drawn states. last: profile in the last state. done: called with the fraction that is done.
     """
     found: list[dict[str, np.ndarray]] = [{} for _ in path.states]
     fields = {id(entry): _Fields(path.same_mesh(entry.states[0]), last) for entry in path.segments}
