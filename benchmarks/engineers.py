@@ -37,7 +37,8 @@ OLDER = {"control": "drive", "direction": "moves", "inactive": "without"}
 """Names of arguments in versions before these."""
 CLASSES = {                                                  # (module, class) in this version and in older ones
     "path": [("solve.path_following", "Run"), ("solve.follow", "Run")],
-    "contact": [("contact.face", "FaceContact"), ("contact.approach", "Approach"),
+    "contact": [("contact.face", "FaceContact"), ("contact.step_limit", "Approach"),
+                ("contact.approach", "Approach"),
                 ("discrete.contact.face", "FaceContact"), ("discrete.contact.approach", "Approach"),
                 ("discrete.contact_nodes", "ContactNodes"),
                 ("extensions.contact_events.prediction", "ContactEventPrediction")],

@@ -22,7 +22,7 @@ from limit import clocked  # noqa: E402
 from tray import BOX, tray  # noqa: E402
 
 import formingx as fx  # noqa: E402
-from formingx.contact.approach import Approach  # noqa: E402
+from formingx.contact.step_limit import Approach  # noqa: E402
 from formingx.extensions.space.solid_tool import SolidTool  # noqa: E402
 from formingx.problem.problem import Problem  # noqa: E402
 from formingx.results import files  # noqa: E402

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.physics.contact_law import ContactHistory, Motion
-from formingx.physics.penalty import STICKS, Law
+from formingx.physics.contact_law import STICKS, ContactHistory, Law, Motion
 
 THETA, SLIP = 1e-2, 1e-3
 TOOL = fx.tools.cup(radius=1.0, depth=1.0, mouth=0.1, fillet=0.2)

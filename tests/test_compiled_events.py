@@ -8,10 +8,8 @@ from mpi4py import MPI
 from reference.reduced_contact import ReferencePoints
 
 import formingx as fx
-from formingx.contact.gap_closures import crossing, gap_closures
 from formingx.extensions.contact_events.reduced_contact import CondensedPoints, ToolFrame
-from formingx.physics.contact_law import ContactStatus
-from formingx.physics.penalty import Law
+from formingx.physics.contact_law import ContactStatus, Law
 
 
 def system(seed):
@@ -91,13 +89,13 @@ def test_gap_closures_are_those_of_array_operations(tool, shift):
     shift = random.uniform(0, 0.1, n) if shift == "each" else shift
     laws = [kind(tool, np.inf, 1.0, theta, 1e-3, shift) for kind in (Law, _Arrays)]
     assert [law.profile for law in laws] == [tool, None]
-    times, expected = (gap_closures(law, x, w, free, 0.3) for law in laws)
+    times, expected = (law.gap_closures(x, w, free, 0.3) for law in laws)
     np.testing.assert_array_equal(times, expected)
     came = np.flatnonzero(times < 0.3)
     assert 20 < len(came) < n and free[came].all()
     for i in came:
         there = x[i] + times[i] * w[i]
-        found, again = (crossing(law, i, there, w[i], -0.01, 1e-3, 3) for law in laws)
+        found, again = (law.gap_closure(i, there, w[i], -0.01, 1e-3, 3) for law in laws)
         assert found == pytest.approx(again, rel=1e-12, abs=1e-15)
 
 

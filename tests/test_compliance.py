@@ -6,7 +6,7 @@ from petsc4py import PETSc
 from scipy import sparse
 from test_contact import cup, form
 
-from formingx.solve import compliance, linear
+from formingx.solve import linear, local_contact
 from formingx.solve.linear import DirectSolver
 
 N, ROWS = 60, np.array([3, 4, 17, 18, 40])
@@ -65,14 +65,14 @@ def test_condensed_solutions_are_the_full_ones(solver, monkeypatch):
     random = np.random.default_rng(3)
     E = np.zeros((N, 7))
     E[ROWS] = random.normal(size=(len(ROWS), 7))
-    border = compliance.BorderedTangent(vector(random.normal(size=N)), vector(random.normal(size=N)), 0.7)
+    border = local_contact.BorderedTangent(vector(random.normal(size=N)), vector(random.normal(size=N)), 0.7)
 
     def moved(dx, step):
         return dx[ROWS] * 2 - np.multiply.outer(np.arange(len(ROWS)), step)
-    full = compliance.columns(made, E, border)
-    monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(min_columns=7, min_rows=N))
-    condensed = compliance.columns(made, E, border)
-    assert isinstance(full, compliance.BorderedColumns) and isinstance(condensed, compliance.CondensedColumns)
+    full = local_contact.columns(made, E, border)
+    monkeypatch.setattr(local_contact, "CONDENSATION", linear.Condensation(min_columns=7, min_rows=N))
+    condensed = local_contact.columns(made, E, border)
+    assert isinstance(full, local_contact.BorderedColumns) and isinstance(condensed, local_contact.CondensedColumns)
     forces = random.normal(size=(7, 2))
     assert condensed.steps == pytest.approx(full.steps, rel=1e-10)
     assert condensed.motions(moved) == pytest.approx(full.motions(moved), rel=1e-9, abs=1e-12)
@@ -85,9 +85,9 @@ def test_a_cup_with_condensed_solutions(monkeypatch):
     """A stuck cup has the same states, walls and iterations, whichever way the local contact problem is solved."""
     full = form(cup("stick", (30, 1)), 10.0)
     made = []
-    condensed = compliance.CondensedColumns.__init__
-    monkeypatch.setattr(compliance.CondensedColumns, "__init__", lambda *args: made.append(1) or condensed(*args))
-    monkeypatch.setattr(compliance, "CONDENSATION", linear.Condensation(min_columns=0, min_rows=0))
+    condensed = local_contact.CondensedColumns.__init__
+    monkeypatch.setattr(local_contact.CondensedColumns, "__init__", lambda *args: made.append(1) or condensed(*args))
+    monkeypatch.setattr(local_contact, "CONDENSATION", linear.Condensation(min_columns=0, min_rows=0))
     found = form(cup("stick", (30, 1)), 10.0)
     assert made and found.counts.iterations == full.counts.iterations
     assert found.profile().thickness == pytest.approx(full.profile().thickness, rel=1e-8)

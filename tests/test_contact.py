@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 
 import formingx as fx
-from formingx.contact.increment import Increment
-from formingx.physics.contact_law import ContactHistory, NormalLaw
-from formingx.physics.penalty import Law
+from formingx.contact.face import Increment
+from formingx.physics.contact_law import ContactHistory, Law, NormalLaw
 from formingx.problem.problem import Problem
 
 tools = fx.tools

@@ -12,11 +12,9 @@ from without import run_without
 
 import formingx as fx
 from formingx.contact.step_limit import TrialStep
-from formingx.extensions.contact_events.event_sequence import ContactEventSequence
-from formingx.extensions.contact_events.path_segment import PathSegment
+from formingx.extensions.contact_events.event_sequence import ContactEventSequence, PathSegment
 from formingx.extensions.contact_events.prediction import ContactEventPredictor
-from formingx.extensions.contact_events.reduced_contact import CondensedPoints, ToolFrame
-from formingx.extensions.contact_events.response import BodyResponse
+from formingx.extensions.contact_events.reduced_contact import BodyResponse, CondensedPoints, ToolFrame
 from formingx.physics.contact_law import ContactStatus
 from formingx.problem.problem import Problem
 

@@ -10,8 +10,8 @@ from scipy import optimize
 
 import formingx as fx
 from formingx import tools
-from formingx.contact.increment import Increment
-from formingx.physics.penalty import Law
+from formingx.contact.face import Increment
+from formingx.physics.contact_law import Law
 from formingx.solve import local_contact
 
 THETA, K = 1e-3, 1e4

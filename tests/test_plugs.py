@@ -10,8 +10,7 @@ from conftest import ROOT, treloar
 import formingx as fx
 from formingx.errors import InputError
 from formingx.exact.plug import membrane_sliding_over_plug, membrane_under_plug
-from formingx.solve.jump_rules import snaps
-from formingx.solve.snap_through import was_passed
+from formingx.solve.snap_through import snaps, was_passed
 
 sys.path.insert(0, str(ROOT / "benchmarks"))
 import plug_extremes  # noqa: E402

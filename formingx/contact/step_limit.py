@@ -6,11 +6,259 @@ If a whole region comes into contact in one step, the positions at which its poi
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple, Protocol
 
 import numpy as np
+from mpi4py import MPI
 
-from .approach import Approach, StepRejection
+from ..ranks import combined, gathered
+from .face import FaceContact
+
+
+@dataclass(frozen=True)
+class StepLimits:
+    """Limits that contact sets to a step.
+
+    Attributes:
+        start_fraction: fraction of a step; gaps that close earlier in the step count as closed at its start.
+        overshoot: length of a step that ends at a gap closure, over the arc length to the closure.
+        negligible_gap: distance from the outer edge of the ramp, over the thickness of the sheet, that is negligible.
+        friction_fraction: fraction of a step. If the gap of a sticking point closes in the rest of the step, friction
+            acts on the point from the next step on only.
+        max_slip_ratio: largest slip of a sticking point after its gap closure in a step, over its tributary length.
+        max_cut_ratio: largest depth of the straight path of a point inside a tool, over its tributary length.
+        max_positions: largest number of positions at which this path is checked.
+        min_length: arc length (dimensionless) below which a step is rejected neither for a change of the pressure nor
+            for the slip of a point after its gap closure.
+        min_mixed_length: arc length (dimensionless) below which sticking points may lift off while the gaps of others
+            close.
+    """
+
+    start_fraction: float = 0.02
+    overshoot: float = 1.001
+    negligible_gap: float = 1e-3
+    friction_fraction: float = 0.95
+    max_slip_ratio: float = 2e-3
+    max_cut_ratio: float = 0.5
+    max_positions: int = 4000
+    min_length: float = 1e-4
+    min_mixed_length: float = 5e-4
+
+
+LIMITS = StepLimits()
+
+
+class StepRejection(NamedTuple):
+    """Rejection of a step that is too long.
+
+    Attributes:
+        reason: the reason, as text for the log.
+        fraction: admissible fraction of the step length; 0 if unknown.
+    """
+
+    reason: str
+    fraction: float = 0.0
+
+
+class Approach:
+    """Contact of one face during a step: prediction of gap closures before the solve, checks after it.
+
+    `StepLimit` calls `step_length`, `closures` and `prepare` before the solve of a step, the other methods after it.
+
+    Args:
+        face: the contact.
+        conducts: True if heat flows through points in contact, from the end of the step on.
+
+    Attributes:
+        points: number of points of the face on all ranks.
+        max_closures: number of points that may come into contact in one step along the tangent. It is ten times larger
+            if the result does not depend on the order of the gap closures.
+    """
+
+    def __init__(self, face: FaceContact, conducts: bool):
+        self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
+        self.points = combined(face.comm, len(face.rule.points))
+        self.max_closures = (given or 1) * (1 if face.law.has_history or conducts else 10)
+        self._predicted_closures = 0                        # number in the step, on all ranks
+        self._bonded_from: np.ndarray = np.ones(len(face.rule.points))      # fraction of the step; 1: not in the step
+
+    def touches(self, fields: np.ndarray, control: float) -> bool:
+        """Return True if a point of the face, on any rank, is in contact; fields: owned unknowns, shape (n,)."""
+        return bool(combined(self._comm, bool(self.face.touching(fields, control).any()), MPI.LOR))
+
+    def step_length(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
+                    length: float) -> float:
+        """Return the arc length, at most `length`, of a step along (direction, slope), d/ds of (fields, control).
+
+        fields, direction: locally owned unknowns, shape (n,). The step ends where `max_closures` new points have come
+        into contact, or at the first gap closure if at most one point was in contact. If a whole region came into
+        contact in one step, its sticking positions would depend on the step length.
+        """
+        face = self.face
+        start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
+        free = ~face.law.touching(start, face.history)
+        length = self._within_motion(start, velocity, free, length)
+        arc_lengths = face.law.gap_closures(start, velocity, free, length)
+        ahead = (arc_lengths > LIMITS.start_fraction * length) & (arc_lengths < length)
+        arc_lengths = np.sort(gathered(self._comm, arc_lengths[ahead]))
+        touching = combined(self._comm, int(np.sum(~free & (face.rule.area > 0))), MPI.SUM)
+        allowed = self.max_closures if touching > 1 else 1
+        return min(LIMITS.overshoot * arc_lengths[allowed - 1], length) if len(arc_lengths) >= allowed else length
+
+    def _within_motion(self, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> float:
+        """Return the arc length within which a tangent predicts gap closures; by default `length`.
+        start, velocity: positions of points and d/ds, shape (n, c). free: mask of the open ones."""
+        return length
+
+    def closures(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
+                 length: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return the gap closures of the n owned points along a tangent (direction, slope), d/ds of (fields, control).
+
+        For each point the arc length, shape (n,), `length` for points that are closed or stay open, and the position
+        there relative to the tool, shape (n, c), length.
+        """
+        face = self.face
+        start, velocity = face.positions(fields, control), face.relative_motion(direction, slope)
+        free = ~face.law.touching(start, face.history) & (face.rule.area > 0)
+        arc_lengths = face.law.gap_closures(start, velocity, free, length)
+        return arc_lengths, start + arc_lengths[:, None] * velocity
+
+    def prepare(self, arc_lengths: np.ndarray, places: np.ndarray, length: float, ends: bool,
+                guessed: np.ndarray | None = None, speeds: np.ndarray | None = None) -> None:
+        """Store the predicted positions `places`, shape (n, c), length, of gap closures at `arc_lengths`, shape (n,).
+
+        speeds: d(position)/ds before the closures, shape (n, c). guessed: mask of points with predicted forces. ends:
+        True if `StepLimit.check` may shorten the step to a closure. A late closure (`StepLimits.friction_fraction`)
+        then carries friction in the next step only, unless its slip is too large (`StepLimits.max_slip_ratio`).
+        """
+        face = self.face
+        self._predicted_closures = combined(self._comm, int(np.sum(arc_lengths < length)), MPI.SUM)
+        if face.law.adhesive:
+            self._bonded_from = np.where(False if guessed is None else guessed, arc_lengths / length, 1.0)
+        at_end = ends & face.contact.sticks & (arc_lengths >= LIMITS.friction_fraction * length)
+        if speeds is not None and at_end.any():
+            tangent = face.law.part(np.flatnonzero(at_end)).nearest(places[at_end]).tangent
+            slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - arc_lengths[at_end])
+            at_end[at_end] = slip <= LIMITS.max_slip_ratio * face.rule.lengths[at_end]
+        face.set_closures(np.where(at_end[:, None], np.nan, places), guessed)
+
+    settling = 0
+    """Number of Newton iterations that contact needs in a step of any length; the step control does not count them."""
+
+    def prepares(self, ends: bool) -> bool:
+        """Return True if `prepare` uses predicted gap closures; ends: True if `rejection` may shorten the step."""
+        return True
+
+    def rejection(self, old: Any, new: Any, n: int, length: float, ends: bool) -> StepRejection | None:
+        """Return the rejection of a solved step that is too long for this contact, or None.
+
+        n: number of locally owned unknowns. ends: True to also reject a step after whose gap closure a point slips
+        wrongly (`fraction_to_wrong_slip`). The repeated step ends at this gap closure.
+        """
+        x, control = new.x[:n], new.control
+        if self.has_too_many_closures(old.x[:n], old.control, x, control):
+            return StepRejection("too many points came into contact in one step")
+        if self.passes_through(old.x[:n], old.control, x, control):
+            return StepRejection("a tool would pass through the face that it touches")
+        if length > LIMITS.min_mixed_length and self.opens_and_closes(x, control):
+            return StepRejection("points lift off while others come into contact", 0.5)
+        if ends and length > LIMITS.min_length:
+            part = self.fraction_to_lost_bond(x, control)
+            if part < 1:
+                return StepRejection("gap closure", min(LIMITS.overshoot * part, 1.0))
+            part = self.fraction_to_wrong_slip(x, control, new.direction[:n], new.slope, length)
+            if part < 1:
+                return StepRejection("gap closure", part)
+        return None
+
+    def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """Return True if too many points came into contact in a step; old, new: owned unknowns, shape (n,).
+
+        The limit is 2 plus twice the larger of `max_closures` and the number predicted; none without history variables.
+        """
+        face, theta = self.face, self.face.law.theta
+        if face.history is None:
+            return False
+        a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
+        found = int(np.sum((a <= -theta - LIMITS.negligible_gap * face.thickness) & (b > -theta)))
+        return bool(combined(self._comm, found, MPI.SUM) > 2 * max(self.max_closures, self._predicted_closures) + 2)
+
+    def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
+        """Return True if sticking points lifted off and moved along the tool while other gaps closed, on any ranks.
+
+        The positions at which gaps close depend on the points that still stick. A long step gets these positions wrong.
+        new: owned unknowns at its end, shape (n,).
+        """
+        face, theta, history = self.face, self.face.law.theta, self.face.history
+        if history is None or not face.contact.sticks or face.law.adhesive:
+            return False
+        x, area = face.positions(new, control), face.rule.area > 0
+        near = face.law.nearest(x)
+        distance, back = near.distance, np.abs(np.einsum("ni,ni->n", near.tangent, x - history.position))
+        opens = area & (history.distance > -theta) & (distance <= -theta) & (back > 0)      # not on the axis
+        closes = area & (history.distance <= -theta - LIMITS.negligible_gap * face.thickness) & (distance > -theta)
+        found = combined(self._comm, np.array([opens.any(), closes.any()], dtype=int), MPI.SUM)
+        return bool(np.all(found > 0))
+
+    def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+        """Return True if the straight path of a point, relative to the tool, leads through it (`cuts_tool`)."""
+        return self.cuts_tool(self.face.positions(old, old_control), self.face.positions(new, control))
+
+    def cuts_tool(self, a: np.ndarray, b: np.ndarray) -> bool:
+        """Return True if a straight path from a to b, relative to the tool, shape (n, c), length, is too deep in it.
+
+        The depth on the path may exceed the larger depth of its ends by `StepLimits.max_cut_ratio` times the tributary
+        length. A point that slides over an edge may cut the edge off by this depth. The result holds for all ranks.
+        """
+        law, lengths = self.face.law, self.face.rule.lengths
+        path_length, most = np.linalg.norm(b - a, axis=1), LIMITS.max_cut_ratio * lengths
+        first, last = law.distance(a), law.distance(b)
+        ends, between = np.maximum(np.maximum(first, last), 0.0), (first + last + path_length) / 2    # bound of depths
+        far = np.flatnonzero((between > ends + most) & (lengths > 0))
+        found = False
+        if len(far):
+            parts = int(min(np.ceil((path_length / most)[far].max() * 2), LIMITS.max_positions)) + 1
+            places = a[far] + np.linspace(0, 1, parts)[:, None, None] * (b - a)[far]
+            found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
+        return bool(combined(self._comm, found, MPI.LOR))
+
+    def fraction_to_lost_bond(self, new: np.ndarray, control: float) -> float:
+        """Return the fraction of a step to the first gap closure whose point is open again at its end; else 1.
+
+        A point that cannot separate is bonded from the first accepted state after its closure on: the step should end
+        there.
+        """
+        if not self.face.law.adhesive:
+            return 1.0
+        opened = ~self.face.touching(new, control)
+        return float(combined(self._comm, float(self._bonded_from[opened].min(initial=1.0)), MPI.MIN))
+
+    def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
+                               length: float) -> float:
+        """Return the fraction of a step to the first gap closure whose point then slips wrongly; 1 without such points.
+
+        A sticking point slips wrongly if it moves along the tool by more than `StepLimits.max_slip_ratio` without
+        friction. A point with Coulomb friction does so if it slides against its slip since the closure. Pressure and
+        slip are assumed to grow linearly from there, with rates along (direction, slope), d/ds of the unknowns, shape
+        (n,), and the control.
+        """
+        face, law, history = self.face, self.face.law, self.face.history
+        if history is None or not law.has_friction:
+            return 1.0
+        end, velocity = face.positions(new, control), face.relative_motion(direction, slope)
+        near = law.nearest(end)
+        F, grows = law.ramp(near.distance)
+        rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)
+        since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
+        slid = since * np.einsum("ni,ni->n", near.tangent, velocity)
+        if face.contact.sticks:
+            wrong = np.isnan(history.closure[:, 0]) & (np.abs(slid) > LIMITS.max_slip_ratio * face.rule.lengths)
+        else:
+            counted = np.einsum("ni,ni->n", near.tangent, end - history.closure)
+            wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
+        late = (history.distance <= -law.theta) & (F > 0) & wrong
+        return float(combined(self._comm, 1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))
 
 
 class EventPrediction(Protocol):

@@ -1,14 +1,116 @@
 """Derivatives of a scene's residual without contact: tangent matrix, and derivative with respect to the control."""
 
-from collections.abc import Callable
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 import ufl
 from dolfinx import fem
+from dolfinx.fem import petsc as fem_petsc
+from petsc4py import PETSc
 
+from .. import _compat
 from .constraints import Constraints
-from .matrix import ExtendedMatrix
+
+
+class ExtendedMatrix:
+    """Sparse matrix of a tangent K and m constraint rows C, allocated once and refilled for every tangent.
+
+    Args:
+        form: compiled bilinear form of K.
+        index_map: index map of its space (block size 1).
+        bcs: DirichletBCs of constrained unknowns. Later calls of `constrain` may constrain a subset of them.
+        rows: list of the m rows of C, locally owned entries, shape (n,) each. Later rows must be 0 where these are 0.
+        comm: MPI communicator.
+        symmetric: True if K is symmetric.
+
+    Attributes:
+        mat: the PETSc matrix.
+    """
+
+    def __init__(self, form: Any, index_map: Any, bcs: list, rows: list[np.ndarray], comm: Any, symmetric: bool):
+        self._form, self._index_map, self._comm = form, index_map, comm
+        self._first = index_map.size_global
+        self._last_rank = comm.rank == comm.size - 1
+        self.constrain(bcs, rows)
+        n, m = index_map.size_local, len(rows)
+        size = n + (m if self._last_rank else 0)
+        indptr, columns = self._pattern(rows, m)
+        self.mat = PETSc.Mat().createAIJ(((size, None), (size, None)), csr=(indptr, columns, np.zeros(len(columns))),
+                                         comm=comm)
+        ghosted = index_map.local_to_global(np.arange(n + index_map.num_ghosts, dtype=np.int32))
+        mapping = PETSc.LGMap().create(ghosted.astype(PETSc.IntType), comm=comm)
+        self.mat.setLGMap(mapping, mapping)
+        mapping.destroy()
+        if symmetric:
+            self.mat.setOption(PETSc.Mat.Option.SYMMETRIC, True)
+
+    def constrain(self, bcs: list, rows: list[np.ndarray]) -> None:
+        """Set DirichletBCs and rows of the constraint matrix C, owned entries, shape (n,) each, of later tangents.
+
+        Constrained unknowns, and the multipliers of rows that are 0 on all ranks, get unit vectors.
+        """
+        self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]
+        self._constrained = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
+        for bc in bcs:
+            self._constrained[bc.dof_indices()[0]] = True
+        self._entries = []              # (own numbers, own weights, all numbers, all weights) of each row of C
+        for row in rows:
+            mine = np.flatnonzero(row)
+            parts = self._comm.allgather((mine + offset, row[mine]))
+            self._entries.append((mine + offset, row[mine], np.concatenate([n for n, _ in parts]),
+                                  np.concatenate([w for _, w in parts])))
+
+    def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
+        """Assemble and return the matrix, with blocks (dofs, shape (n, m), with ghosts; values, shape (n, m, m)) added.
+
+        The m unknowns of a block must share a cell. Entries of constrained unknowns are skipped.
+        """
+        A, add = self.mat, PETSc.InsertMode.ADD_VALUES
+        A.zeroEntries()
+        _compat.assemble_matrix(A, self._form, self._bcs)
+        A.assemble(PETSc.Mat.AssemblyType.FLUSH)
+        for dofs, values in blocks:
+            free = ~self._constrained[dofs]
+            values = values * free[:, :, None] * free[:, None, :]
+            A.setValuesLocalRCV(dofs, dofs, values.reshape(len(dofs), dofs.shape[1] ** 2), addv=add)
+        for k, (mine, weights, everyone, all_weights) in enumerate(self._entries):
+            if len(mine):
+                A.setValues(mine.astype(PETSc.IntType), [self._first + k], weights, addv=add)
+            if self._last_rank:
+                A.setValues([self._first + k], everyone.astype(PETSc.IntType), all_weights, addv=add)
+                A.setValue(self._first + k, self._first + k, float(len(everyone) == 0), addv=add)
+        A.assemble()
+        return A
+
+    def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
+        """Return the sparsity pattern: row pointers and global column numbers of all locally owned rows.
+
+        rows: rows of the constraint matrix C, locally owned entries, shape (n,) each. m: their number.
+        """
+        plain = fem_petsc.create_matrix(self._form)
+        _compat.assemble_matrix(plain, self._form, self._bcs)
+        plain.assemble()
+        indptr, indices, _ = plain.getValuesCSR()
+        plain.destroy()
+        entries = [np.flatnonzero(row) for row in rows]      # the multipliers' columns come after all others
+        added = np.concatenate([np.full(len(i), self._first + k) for k, i in enumerate(entries)]) if rows else []
+        places = np.concatenate(entries) if rows else np.zeros(0, dtype=int)
+        order = np.lexsort((added, places)) if rows else places
+        columns = np.insert(indices, indptr[1:][places[order]], np.asarray(added, dtype=indices.dtype)[order])
+        lengths = np.diff(indptr) + np.bincount(places, minlength=len(indptr) - 1)
+        if self._last_rank:
+            tail = self._first + np.arange(m)
+            parts = [np.concatenate([np.sort(everyone), tail]) for _, _, everyone, _ in self._entries]
+            columns, lengths = np.concatenate([columns, *parts]), np.append(lengths, [len(part) for part in parts])
+        pointers = np.concatenate([[0], np.cumsum(lengths)])
+        return pointers.astype(PETSc.IntType), columns.astype(PETSc.IntType)
+
+    def destroy(self) -> None:
+        """Free the PETSc objects (collective)."""
+        self.mat.destroy()
 
 
 class Tangent:

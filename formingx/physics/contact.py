@@ -38,9 +38,8 @@ import numpy as np
 from ..errors import InputError, check_type, count, pair, positive, triple
 from ..values.temperature import FunctionOfTemperature
 from .contact_arguments import coefficient, contact_points
-from .contact_law import ContactLaw
+from .contact_law import RAMP_EDGE, STICKS, ContactLaw, Law
 from .part import ScenePart
-from .penalty import RAMP_EDGE, STICKS, Law
 
 _STICKING_RATIO = 1000.0
 """Ratio T/N above which a sticking point that may separate slides: it carries no shear traction without pressure."""

@@ -22,11 +22,10 @@ from .arc_length import Predictor
 from .branches import OrientationCheck, ReversedOrientation, warn_of_branches
 from .diagnose import diagnose, not_reached
 from .equations import Array, Attempt, Quantity
-from .jump_rules import JumpRules, at_limit_points, snaps
 from .newton import Failure, fixed, tangents
 from .progress import Progress, RunTargets
 from .record import InadmissibleState, Record
-from .snap_through import SnapThrough, was_passed
+from .snap_through import JumpRules, SnapThrough, at_limit_points, snaps, was_passed
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
 

@@ -14,20 +14,94 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from mpi4py import MPI
 
-from ...contact.approach import LIMITS
-from ...contact.gap_closures import crossing, gap_closures
+from ...contact.step_limit import LIMITS
 from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
 from ...values.tolerances import FAR, LARGE_ERROR
-from .gap_closure import GapClosure
-from .path_segment import PathSegment
-from .reduced_contact import CondensedPoints, ToolFrame
-from .response import BodyResponse
+from .reduced_contact import BodyResponse, CondensedPoints, ToolFrame
+
+
+class GapClosure(NamedTuple):
+    """Contact event: the gap of an open point closes, at the signed distance -theta from its tool.
+
+    The half-width theta of the contact ramp belongs to the contact law. All ranks store the same value.
+
+    Attributes:
+        arc_length: arc length of the event from the accepted state.
+        rank: rank that owns the point.
+        face: number of the contact face.
+        point: local number of the point.
+        place: position of the point relative to the tool at the event, shape (2,), length.
+        tolerance: convergence tolerance of `place`, length.
+    """
+
+    arc_length: float
+    rank: int
+    face: int
+    point: int
+    place: np.ndarray
+    tolerance: float
+
+    @property
+    def point_id(self) -> tuple[int, int, int]:
+        """Identifier of the point, (rank, face, point)."""
+        return self.rank, self.face, self.point
+
+
+class PathSegment(NamedTuple):
+    """Linear segment of the predicted path, from an arc length to the next event.
+
+    n is the number of all contact points of this rank. m is the number of those points, of all ranks, whose compliance
+    is known: the motion of the body under unit forces at the points. The contact stiffness of points that were closed
+    at the accepted state is part of the factorised tangent.
+
+    Attributes:
+        begins: arc length at the start of the segment, from the accepted state.
+        positions: positions of the n points of all faces relative to their tools at the start, shape (n, 2), length.
+        speed: derivatives of the positions with respect to arc length, shape (n, 2), length.
+        status: contact statuses, shape (m,): -1 or 1 for sliding against or along the tangent of the tool, 0 sticking,
+            2 open (`ContactStatus`).
+        place: positions relative to the tools at which sticking points have no tangential force, shape (m, 2), length.
+        force: contact forces at the start, with the sign and scale of the residual F, shape (m, 2), dimensionless.
+        rate: derivatives of `force` with respect to arc length, shape (m, 2).
+        extra: change of `force` since the accepted state, minus the part due to the contact stiffness in the factorised
+            tangent, shape (m, 2).
+        growth: derivatives of `extra` with respect to arc length, shape (m, 2).
+        correction: sums of all equilibrium corrections of x, locally owned entries, and of the control.
+    """
+
+    begins: float
+    positions: np.ndarray
+    speed: np.ndarray
+    status: np.ndarray
+    place: np.ndarray
+    force: np.ndarray
+    rate: np.ndarray
+    extra: np.ndarray
+    growth: np.ndarray
+    correction: tuple[np.ndarray, float]
+
+    def after(self, s: float) -> PathSegment:
+        """Return the rest of this segment, from an arc length on, measured from the accepted state."""
+        ds = s - self.begins
+        return self if ds == 0 else self._replace(begins=s, positions=self.positions + ds * self.speed,
+                                                  force=self.force + ds * self.rate,
+                                                  extra=self.extra + ds * self.growth)
+
+    def extended(self, m: int) -> PathSegment:
+        """Return this segment with forces and statuses for m points; points added at the end are open."""
+        added = m - len(self.status)
+        if not added:
+            return self
+        blank = np.zeros((added, self.force.shape[1]))
+        grown = {name: np.concatenate([getattr(self, name), blank])
+                 for name in ("place", "force", "rate", "extra", "growth")}
+        return self._replace(status=np.append(self.status, np.full(added, ContactStatus.FREE)), **grown)
 
 
 @dataclass(frozen=True)
@@ -146,7 +220,7 @@ class ContactEventSequence:
         arc_lengths, positions = np.full(len(piece.positions), length), piece.after(length).positions.copy()
         speeds, sure = np.zeros_like(positions), np.zeros(len(positions), dtype=bool)
         for closure in self._closures:
-            s, i = closure.arc_length, points.row(closure)
+            s, i = closure.arc_length, points.starts[closure.face] + closure.point
             if s < length and closure.rank == self._comm.rank:
                 arc_lengths[i], positions[i], speeds[i] = s, closure.place, self._piece(s).speed[i]
         points.spread(piece.extended(len(points.point_ids)).status != ContactStatus.FREE, sure)
@@ -288,7 +362,7 @@ class ContactEventSequence:
     def _gap_closures(self, segment: PathSegment, length: float) -> np.ndarray:
         """Return the arc lengths from the start of a segment at which gaps close, shape (n,); `length` if open."""
         parts = zip(self._faces, *map(self._points.of_faces, (segment.positions, segment.speed, self._free)))
-        return np.concatenate([gap_closures(face.law, x, w, free, length) for face, x, w, free in parts])
+        return np.concatenate([face.law.gap_closures(x, w, free, length) for face, x, w, free in parts])
 
     def _store_first(self, arc_lengths: np.ndarray, length: float, segment: PathSegment) -> bool:
         """Append the earliest gap closure of all ranks to `_closures`; return False if none is before `length`.
@@ -313,8 +387,8 @@ class ContactEventSequence:
         if rank == self._comm.rank:
             face, row = self._faces[f], self._points.starts[f] + i
             x, w = positions[row], self._pieces[-1].speed[row]
-            ds = crossing(face.law, i, x, w, self._pieces[-1].begins - s, _SETTINGS.sticking_tolerance,
-                          _SETTINGS.max_surface_iterations)
+            ds = face.law.gap_closure(i, x, w, self._pieces[-1].begins - s, _SETTINGS.sticking_tolerance,
+                                      _SETTINGS.max_surface_iterations)
             slides = face.moves and not self._points.sticks[row]
             tolerance = _SETTINGS.sliding_tolerance if slides else _SETTINGS.sticking_tolerance
             closure = GapClosure(s + ds, rank, f, i, x + ds * w, tolerance * float(face.rule.lengths[i]))
@@ -367,7 +441,7 @@ class ContactEventSequence:
         """
         arc_lengths, free = np.full(len(self._free), end.begins), self._free.copy()
         if but and but.rank == self._comm.rank:
-            free[self._points.row(but)] = False
+            free[self._points.starts[but.face] + but.point] = False
         parts = map(self._points.of_faces, (arc_lengths, end.positions, last.speed, free))
         for face, t, x, w, candidates in zip(self._faces, *parts):
             near = face.law.nearest(x)
@@ -437,7 +511,7 @@ class ContactEventSequence:
         arc_lengths = self._gap_closures(last, left)
         points.spread(np.full(len(points.point_ids), left), arc_lengths)
         if closure.rank == self._comm.rank:
-            arc_lengths[points.row(closure)] = -1.0
+            arc_lengths[points.starts[closure.face] + closure.point] = -1.0
         for of_face in points.of_faces(arc_lengths):
             first = np.argsort(of_face, kind="stable")[: self._batch]
             chosen.append(np.sort(first[of_face[first] < left]))

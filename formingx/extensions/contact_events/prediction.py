@@ -12,11 +12,10 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...contact.approach import LIMITS, Approach
-from ...contact.step_limit import StepLimit
+from ...contact.step_limit import LIMITS, Approach, StepLimit
 from ...ranks import combined
 from .event_sequence import ContactEventSequence
-from .response import BodyResponse
+from .reduced_contact import BodyResponse
 
 log = logging.getLogger("formingx")
 

@@ -10,8 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from ...contact.face import FaceContact
-from ...contact.face_history import FaceHistory
+from ...contact.face import FaceContact, FaceHistory
 from ...contact.rule import Lobatto
 from ...physics.contact_law import ContactHistory
 

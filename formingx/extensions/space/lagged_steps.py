@@ -13,8 +13,8 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...contact.approach import LIMITS, Approach, StepRejection
 from ...contact.face import FaceContact
+from ...contact.step_limit import LIMITS, Approach, StepRejection
 from ...physics.contact_law import ContactHistory
 from ...ranks import combined
 from .passed_tools import PassedPoint, PassedTool
@@ -60,7 +60,7 @@ LAGGED = LaggedLimits()
 
 
 class LaggedApproach(Approach):
-    """Lagged contact of one face during a step, see `formingx.contact.approach.Approach`.
+    """Lagged contact of one face during a step, see `formingx.contact.step_limit.Approach`.
 
     Args:
         face: the contact.

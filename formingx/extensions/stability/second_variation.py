@@ -34,7 +34,7 @@ from dolfinx import fem
 
 from ...errors import InputError
 from ...forms.loaded_body import LoadedBody
-from ...forms.matrix import ExtendedMatrix
+from ...forms.tangent import ExtendedMatrix
 from ...physics.kinematics import BLOCK
 from ...physics.supports import Constrained, Symmetry
 
