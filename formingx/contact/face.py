@@ -214,7 +214,7 @@ class FaceContact:
                            Lobatto(solid, contact.on, assemble) if contact.points == "nodes" else
                            Gauss(solid, contact.on, int(contact.points)))
         self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
-        self._warm = solid.temperature.nodes(self.rule.nodes) if contact.friction_by_temperature else None
+        self._warm = solid.temperature.nodes(self.rule.nodes, contact.on) if contact.friction_by_temperature else None
         self._penalty = np.ones(len(self.points))
         self.unbalanced = np.zeros(self.points.shape[1])
         self.shift: np.ndarray | None = None

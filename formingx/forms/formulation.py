@@ -8,6 +8,7 @@ the user's units, and the solver works with numbers of order one.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -24,6 +25,7 @@ from ..errors import call_on_all_ranks
 from ..physics import kinematics as kin
 from ..ranks import combined
 from .admissible import Admissible
+from .energy_rule import EnergyRule
 from .free_stretch import FreeStretch
 from .history import History
 from .loaded_body import LoadedBody
@@ -55,7 +57,8 @@ class Formulation(ABC):
         elastic_F: F without thermal expansion (UFL, shape (3, 3)).
         J: det `elastic_F` divided by `ratio_before` (UFL scalar).
         ratio_before: det F of the deformation transferred from another mesh (`StateTransfer`), else 1.
-        dx: measure of the domain.
+        rule: quadrature rule of the energy (`EnergyRule`).
+        dx: measure of the domain, with this rule.
         weight: reference volume per measure `dx` (UFL scalar).
         control: `Constant` of the dimensionless load parameter (control).
         time: process time, a function of the control (UFL scalar, time).
@@ -88,19 +91,19 @@ class Formulation(ABC):
         self.stress = max(scene.shear_modulus(name) for name in scene.mesh.layers)
         self.mesh = self._make_mesh()
         self.domain = self.mesh.domain
-        self.temperature: Any = None if scene.temperature is None else Temperature(scene.temperature)
         self.comm = scene.mesh.comm
         self.displacement_element, elements = self._elements(self.domain.basix_cell())
         self.space = fem.functionspace(self.domain, basix.ufl.mixed_element(elements))
         self.w = fem.Function(self.space, name="w")
+        self.temperature: Any = None if scene.temperature is None else self._make_temperature()
         self.control = self.constant(0.0)
         self._control = ufl.variable(self.control)
         self._time = self.constant(0.0), self.constant(0.0)                    # base, and rate by the control
         self.time = self._time[0] + self._time[1] * self._control
         self.u = self.constant(self.length) * ufl.split(self.w)[0]
         self.X = ufl.SpatialCoordinate(self.domain)
-        self.dx = ufl.Measure("dx", self.domain, subdomain_data=self.mesh.cells,
-                              metadata={"quadrature_degree": scene.quadrature_degree})
+        self.rule = self._energy_rule()
+        self.dx = ufl.Measure("dx", self.domain, subdomain_data=self.mesh.cells, metadata=self.rule.metadata)
         self.ds = ufl.Measure("ds", self.domain, subdomain_data=self.mesh.facets)
         self.weight = self._weight()
         self.volume = self.integral(self.weight * self.dx)
@@ -116,6 +119,21 @@ class Formulation(ABC):
         self._add_materials()
         self._add_supports(body)
         self.residual, self.control_derivative, self.time_derivative = self._residual(body)
+
+    def _make_temperature(self) -> Any:
+        """Return the temperature of the body at the last accepted state."""
+        return Temperature(self.scene.temperature)
+
+    def _energy_rule(self) -> EnergyRule:
+        """Return the quadrature rule of the energy."""
+        return EnergyRule.of_degree(self.domain.basix_cell(), self.scene.quadrature_degree)
+
+    def mean_over_depths(self, law: Callable, terms: MaterialTerms) -> Callable:
+        """Return the law f(T) of a coefficient at one quadrature point, for the temperatures of `temperatures`.
+
+        A sheet may give temperatures at several depths of a point; the coefficient is then the mean of f.
+        """
+        return law
 
     def _add_materials(self) -> None:
         """Set the coefficients, histories and energies of the materials."""
@@ -198,7 +216,7 @@ class Formulation(ABC):
     def set_loads(self, setting: Any) -> None:
         """Set loads, elastic supports and process time as functions of the control, from step data (`StepData`)."""
         for support, factor in self.elastic_supports:
-            factor.value = float(not any(self.scene.items[i] is support for i in setting.inactive))
+            factor.value = float(self.scene.items.index(support) not in setting.inactive)
         for i, (load, base, rate) in enumerate(self._loads):
             active = i not in setting.inactive
             base.value = active * (setting.base[i] if load.driven else load.value)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from typing import Any
 
-import basix
-import basix.ufl
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -47,8 +45,7 @@ class MaterialTerms:
         self.own_cells = self.cells[self.cells < len(own_cells(forms.domain))]
         self.X = forms.X
         self._coefficients: list[TemperatureCoefficient] = []
-        cell, degree = forms.domain.basix_cell(), forms.scene.quadrature_degree
-        self.places = basix.make_quadrature(cell, degree)[0]
+        self.places = forms.rule.places
         self.start = forms.constant(0.0)
         self.constants = {name: self._constant(name, value) for name, value in material.constants().items()}
         self.rest_stress = self._rest_stress(self.constants) if material.varies else forms.constant(
@@ -74,9 +71,7 @@ class MaterialTerms:
 
     def quadrature_function(self, shape: tuple[int, ...] = ()) -> fem.Function:
         """Return a zero `Function` with a value of a given shape at every quadrature point of the energy."""
-        element = basix.ufl.quadrature_element(self.forms.domain.basix_cell(), value_shape=shape, scheme="default",
-                                               degree=self.forms.scene.quadrature_degree)
-        return fem.Function(fem.functionspace(self.forms.domain, element))
+        return fem.Function(fem.functionspace(self.forms.domain, self.forms.rule.element(shape)))
 
     def position_coefficient(self, function: Any) -> fem.Function:
         """Return a quadrature `Function` of f(R, Z), of the reference position on the first mesh of a run, length.
@@ -99,7 +94,7 @@ class MaterialTerms:
         A constant named in `Material.flow_constants` is evaluated in the middle of the step.
         """
         forms, found = self.forms, self.quadrature_function()
-        law = getattr(function, "clamped", function)          # a user's own constant may be any function
+        law = forms.mean_over_depths(getattr(function, "clamped", function), self)   # a user's may be any function
         coefficient = TemperatureCoefficient(forms, found, [(self.cells, law)], [forms.temperatures(self)])
         self._coefficients.append(coefficient)
         return coefficient.at_time(forms.time - (self._time_step / 2 if self._in_middle else 0))

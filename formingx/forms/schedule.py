@@ -21,7 +21,8 @@ class StepData:
         base: amplitude of each load, support and contact at control 0, in the order of `Scene.items` (0 for those
             without control), then the process time.
         rate: derivatives of the amplitudes and of the process time with respect to the control.
-        inactive: indices of the inactive loads, supports and contacts in `Scene.items`.
+        inactive: indices of the inactive loads, supports and contacts in `Scene.items`, and numbers of inactive laws of
+            heat (`Scene.heat_laws`).
         fading: True if forces that a change of the active loads, supports or contacts leaves out of balance vanish as
             the control goes from 0 to 1.
         stage: number of the stage in its process.

@@ -35,14 +35,18 @@ class Temperature:
         values = [self.T.x.array] if self.before is None else [self.T.x.array, self.before]
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
 
-    def at_points(self, points: np.ndarray) -> np.ndarray:
-        """Return the temperatures at points, shape (n, 2), length, of each rank, within `limits`; collective."""
+    def at_points(self, points: np.ndarray, depth: np.ndarray | None = None) -> np.ndarray:
+        """Return the temperatures at points, shape (n, 2), length, of each rank, within `limits`; collective.
+
+        The depth in a sheet is not used: this temperature is uniform through the thickness of a sheet.
+        """
         return np.clip(fields.values_at(self.T, np.asarray(points, dtype=float), self._given.mesh), *self.limits)
 
-    def nodes(self, points: np.ndarray) -> np.ndarray:
-        """Return the local numbers of nodes at positions in this rank's cells, shape (..., 2), length."""
+    def nodes(self, points: np.ndarray, boundary: str) -> np.ndarray:
+        """Return the local numbers of nodes at positions in this rank's cells, shape (..., 2), on a boundary."""
         from scipy.spatial import cKDTree
-        return cKDTree(self.T.function_space.tabulate_dof_coordinates()[:, :points.shape[-1]]).query(points)[1]
+        nodes = self.T.function_space.tabulate_dof_coordinates()[:, :points.shape[-1]]
+        return np.asarray(cKDTree(nodes).query(points)[1])
 
     def at_nodes(self, nodes: np.ndarray) -> np.ndarray:
         """Return the temperatures at local node numbers of any shape, within `limits`."""

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import basix
 import numpy as np
 import ufl
 from dolfinx import fem
@@ -37,7 +36,7 @@ class PoleStressRatio:
         near = np.unique(np.concatenate([np.zeros(0, np.int32), *cells]))
         near = near[near < len(own_cells(domain))]
         self._problem, self._strain = problem, forms.constant(0.0)
-        self._weights: Any = basix.make_quadrature(domain.basix_cell(), problem.scene.quadrature_degree)[1]
+        self._weights = forms.rule.weights
         self._parts = [(self._expression(terms), np.intersect1d(near, terms.cells).astype(np.int32))
                        for terms in forms.terms]
 
@@ -111,9 +110,7 @@ class ElasticStretches:
                 self._parts.append((compiled, own, len(stretches)))
         self.count = max((count for *_, count in self._parts), default=0)
         if self._parts:
-            points: Any
-            weights: Any
-            points, weights = basix.make_quadrature(forms.domain.basix_cell(), problem.scene.quadrature_degree)
+            points, weights = forms.rule.places, forms.rule.weights
             root = np.sqrt(np.abs(weights))[:, None]
             basis, at_places = (np.column_stack([np.ones(len(x)), x]) for x in (points, places))
             self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection

@@ -233,7 +233,8 @@ class Contact(ScenePart):
         """
         theta, elastic_slip = self.ramp * thickness, self.elastic_slip * thickness
         if self.lagged:
-            return self.tool.contact_law(self, k, thickness)
+            found: ContactLaw = self.tool.contact_law(self, k, thickness)
+            return found.with_friction(self.friction_at(temperature, True)) if self.friction_by_temperature else found
         edge = (1 - RAMP_EDGE * self.separates) * theta
         shift = np.maximum(self.tool.signed_distance(points) + edge, 0.0)
         mu = self.friction_at(temperature, clamped=True)

@@ -506,7 +506,7 @@ class Problem:
 
     def activate(self, number: int, x: np.ndarray, control: float) -> None:
         for contact in self.contacts:
-            if contact.contact is self.scene.items[number]:
+            if contact.contact in self.scene.items[number: number + 1]:             # a law of heat has no item
                 contact.activate(x, control)
                 depth = penetration(contact, x, control)
                 if depth > 1e-6 * self.forms.length:

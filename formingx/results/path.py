@@ -666,24 +666,36 @@ class Path:
         on_mesh = self.same_mesh(state or self.last)
         return ContactFace(on_mesh, contact_of(on_mesh, tool, "contact")[0]).evaluate(state or self.last)
 
-    def temperature(self, points: ArrayLike, state: State | None = None) -> np.ndarray:
+    def temperature(self, points: ArrayLike, state: State | None = None, *,
+                    depth: ArrayLike | None = None) -> np.ndarray:
         """Return the temperature of material points in a state; collective.
 
         Args:
-            points: reference positions (R, Z), shape (n, 2), length.
+            points: reference positions (R, Z), of a flat sheet in three dimensions (X, Y), shape (n, 2), length; of
+                another surface (X, Y, Z), shape (n, 3).
             state: a state of the path; default the last.
+            depth: depths of the points in a sheet in three dimensions, shape () or (n,), from 0 at its bottom (inner)
+                face to 1 at its top (outer) face; None: 0.5, the middle. A section takes no depth.
 
         Returns:
             Temperatures, shape (n,), in the unit of the scene.
 
         Raises:
-            InputError: the scene has no temperature, or a point lies outside the body.
+            InputError: the scene has no temperature, a point lies outside the body, or a depth is not from 0 to 1.
         """
         if self.problem.temperature is None:
             raise InputError("temperature: the scene has no temperature: give Scene temperature=...")
         state = state or self.last
+        in_space = self.scene.kinematics.components == 3
+        flat = not in_space or self.scene.mesh.flat
+        at = as_points("Path.temperature: points", points, 2 if flat else 3)
+        depths = None if depth is None else np.asarray(depth, dtype=float)
+        if depths is not None and not (in_space and depths.shape in ((), (len(at),))
+                                       and np.all((depths >= 0) & (depths <= 1))):
+            raise InputError(f"Path.temperature: depth = {depth!r}: must be numbers from 0 to 1, one or one for each"
+                             f" point, of a sheet in three dimensions")
         with self.segment(state).problem.state_context(state) as problem:
-            return problem.temperature.at_points(problem.followed(as_points("Path.temperature: points", points)))
+            return problem.temperature.at_points(problem.followed(at), depths)
 
     def tool_forces(self) -> dict[str, np.ndarray]:
         """Return the force of the body on each tool in all states.

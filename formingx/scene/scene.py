@@ -203,6 +203,16 @@ class Scene:
         return [*self.loads, *self.supports, *self.contacts]
 
     @property
+    def heat_laws(self) -> dict[str, int]:
+        """Named laws of heat of the scene, {name: number}, for `Stage.inactive`.
+
+        The numbers follow those of `items` and of the process time, in the order of `Cooling.boundaries`.
+        """
+        laws = [] if self.heat is None else self.heat.boundaries
+        first = len(self.items) + 1
+        return {law.name: first + k for k, law in enumerate(laws) if getattr(law, "name", None)}
+
+    @property
     def drivable(self) -> list[Any]:
         """Items whose pressure, displacement or travel a run can control; of a moving tool only the first contact."""
         return [item for i, item in enumerate(self.items)

@@ -34,7 +34,7 @@ class Stage:
             tables. With a `duration` and no control it ends the stage early, such as `sag(30.0)`.
         intermediate: further targets to meet exactly during the stage; targets that are not met are left out.
         inactive: items that are inactive during the stage, themselves or their names, such as a support, a tool or a
-            load. A support that becomes active again constrains the body at its current position. A load that becomes
+            load. Laws of heat take part by their names, such as the heater of an oven. A support that becomes active again constrains the body at its current position. A load that becomes
             active again has its last value; its column is 0 while it is inactive.
         amplitudes: instead of `control`: {item: [(time, value), ...]}, piecewise linear in time, values in the user's
             units; the last value stays. If a table begins later than the stage, the item changes linearly from its
@@ -194,7 +194,7 @@ class Plan(NamedTuple):
             `Stage.control`.
         tables: [(index of the item, knots (time, value), shape (n, 2))] of the argument `amplitudes` of the stage; a
             tool has an entry for each of its contacts.
-        inactive: indices of the inactive items, ascending.
+        inactive: indices of the inactive items and laws of heat (`Scene.heat_laws`), ascending.
         names: all items of the scene, as text, in the order of `Scene.items`.
     """
 
@@ -223,8 +223,10 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     be met.
     """
     caller = stage.label
-    inactive = sorted({i for item in stage.inactive
-                       for i in scene.same_tool(scene.number(f"{caller}: inactive", item))})
+    laws = scene.heat_laws
+    inactive = sorted({laws[item] for item in stage.inactive if item in laws} | {
+        i for item in stage.inactive if item not in laws
+        for i in scene.same_tool(scene.number(f"{caller}: inactive", item))})
     driven = [stage.control] if stage.control is not None else [item for item, _ in stage.tables]
     numbers = [scene.number(caller, item) for item in driven]
     for number in numbers:

@@ -1,21 +1,40 @@
 """Thermal properties of a body, and the laws of heat at its faces and in its interior.
 
 A flux is heat into the body per deformed area and time. All numbers are in one consistent set of units, with the mesh's
-unit of length. A `table` over the reference radius is a `formingx.table`.
+unit of length. A `table` over the reference radius is a `formingx.table`, for sections; for sheets in three dimensions
+`formingx.zones` is a table over x and y.
 """
 
 from typing import Any
 
 from ...errors import InputError, finite, non_negative, positive
 from ...values.table import Table
+from ...values.zones import Zones
+
+Parameter = float | Table | Zones
+"""Parameter of a law of heat: a number, a table over R in a section, or zones over x and y in three dimensions."""
 
 STEFAN_BOLTZMANN = 5.670374419e-8
 """Stefan-Boltzmann constant, W/(m2 K4)."""
 
 
+def numbers_of(parameter: Parameter) -> list[float]:
+    """Return the values of a parameter of a law of heat: one number, or all entries of its table or zones."""
+    if isinstance(parameter, Zones):
+        return [float(value) for value in parameter.values.ravel()]
+    return [float(value) for value in parameter.y] if isinstance(parameter, Table) else [float(parameter)]
+
+
 def is_implausible(biot_number: float) -> bool:
     """Return True for a finite Biot number above 1e4, that of 1e6 W/(m2 K) and 2 mm of a polymer."""
     return 1e4 < biot_number < float("inf")
+
+
+def law_name(kind: str, on: str, name: Any) -> str | None:
+    """Return the checked name of a law of heat, or None; `kind` and `on` are for the message."""
+    if name is not None and (not isinstance(name, str) or not name):
+        raise InputError(f"{kind}({on!r}): name = {name!r}: must be a word")
+    return name
 
 
 class ThermalProperties:
@@ -49,15 +68,17 @@ class ThermalProperties:
 
 
 class _Boundary:
-    """Law of heat at a face, with parameters that are constant or vary with the reference radius R.
+    """Law of heat at a face, with parameters that are constant or vary with the reference position.
 
     Args:
         on: name of the boundary.
-        parameters: numbers or tables over R, by name.
+        name: name of the law for `Stage.inactive`, or None.
+        parameters: numbers, tables over R or zones over x and y, by name.
 
     Attributes:
         on: name of the boundary.
-        parameters: {name: number or `Table` over R}.
+        name: name of the law, or None.
+        parameters: {name: number, `Table` over R or `Zones`}.
         temperatures: names of the parameters that are temperatures.
         quadrature_degree: degree of the quadrature of the flux along an edge.
 
@@ -65,39 +86,47 @@ class _Boundary:
         InputError: a parameter that is neither a finite number nor a table.
     """
 
-    parameters: dict[str, float | Table]
+    parameters: dict[str, Parameter]
     temperatures: tuple[str, ...] = ()
     quadrature_degree = 5
 
-    def __init__(self, on: str, **parameters: Any):
-        self.on = on
+    def __init__(self, on: str, name: str | None, **parameters: Any):
+        self.on, self.name = on, law_name(type(self).__name__, on, name)
         caller = f"{type(self).__name__}({on!r})"
-        self.parameters = {name: value if isinstance(value, Table) else finite(f"{caller}: {name}", value)
+        self.parameters = {name: value if isinstance(value, Table | Zones) else finite(f"{caller}: {name}", value)
                            for name, value in parameters.items()}
 
     def _check_range(self, name: str, low: float, high: float = float("inf")) -> None:
         """Raise an InputError unless the values of the parameter `name` lie between `low` and `high`."""
-        value = self.parameters[name]
-        for number in value.y if isinstance(value, Table) else [value]:
+        for number in numbers_of(self.parameters[name]):
             if not low <= number <= high:
                 allowed = f"at least {low:g}" if high == float("inf") else f"from {low:g} to {high:g}"
-                raise InputError(f"{type(self).__name__}({self.on!r}): {name} = {float(number)!r}: must be {allowed}")
+                raise InputError(f"{type(self).__name__}({self.on!r}): {name} = {number!r}: must be {allowed}")
 
     def check(self, mesh: Any, absolute_zero: float) -> None:
-        """Raise an InputError if a temperature is below absolute zero, or a table does not cover the boundary.
+        """Raise an InputError if a temperature is below absolute zero, or a table does not fit the boundary.
+
+        A section takes tables over R that cover it, a sheet in three dimensions zones over x and y.
 
         Args:
             mesh: the `Mesh`, which must have the boundary.
             absolute_zero: absolute zero in the unit of temperatures.
         """
+        in_space = mesh.domain.geometry.dim == 3
         for name, value in self.parameters.items():
             if name in self.temperatures:
                 self._check_range(name, absolute_zero)
+            if isinstance(value, Table if in_space else Zones):
+                raise InputError(f"{self!r}: {name}: {f'a sheet in three dimensions takes zones over x and y: use'
+                                 f' fx.zones(x, y, values)' if in_space else
+                                 'a section takes a table over R: use fx.table({R: value})'}")
             if isinstance(value, Table):
                 value.check(mesh.nodes_of(self.on)[:, 0], f"R on {self.on!r}")
 
     def __repr__(self) -> str:
-        return f"{type(self).__name__}({self.on!r}, {', '.join(f'{k}={v!r}' for k, v in self.parameters.items())})"
+        named = {"name": self.name} if self.name else {}
+        values = ", ".join(f"{k}={v!r}" for k, v in {**self.parameters, **named}.items())
+        return f"{type(self).__name__}({self.on!r}, {values})"
 
 
 class Convection(_Boundary):
@@ -107,8 +136,9 @@ class Convection(_Boundary):
 
     Args:
         on: name of the boundary.
-        h: heat transfer coefficient, heat per time, area and degree, number or `table` over the reference radius.
-        air: temperature of the air, number or `table` over the reference radius.
+        h: heat transfer coefficient, heat per time, area and degree, number, `table` over the reference radius, or `zones`.
+        air: temperature of the air, number, `table` over the reference radius, or `zones`.
+        name: name of the law, for `Stage.inactive`; None: it acts in all stages.
 
     Raises:
         InputError: a negative h, or a value that is neither a finite number nor a table.
@@ -119,8 +149,8 @@ class Convection(_Boundary):
 
     temperatures = ("air",)
 
-    def __init__(self, on: str, *, h: float | Table, air: float | Table):
-        super().__init__(on, h=h, air=air)
+    def __init__(self, on: str, *, h: Parameter, air: Parameter, name: str | None = None):
+        super().__init__(on, name, h=h, air=air)
         self._check_range("h", 0.0)
 
     def flux(self, T, absolute_zero, h, air):
@@ -147,10 +177,11 @@ class Radiation(_Boundary):
 
     Args:
         on: name of the boundary.
-        emissivity: emissivity epsilon of the face, from 0 to 1, number or `table` over the reference radius.
-        heater: temperature of the heater in the unit of the run, number or `table` over the reference radius.
-        view_factor: view factor f, from 0 to 1, number or `table` over the reference radius.
+        emissivity: emissivity epsilon of the face, from 0 to 1, number, `table` over the reference radius, or `zones`.
+        heater: temperature of the heater in the unit of the run, number, `table` over the reference radius, or `zones`.
+        view_factor: view factor f, from 0 to 1, number, `table` over the reference radius, or `zones`.
         stefan_boltzmann: sigma in the units of the run: 5.670374419e-8 in W/(m2 K4), 5.670374419e-14 in W/(mm2 K4).
+        name: name of the law, for `Stage.inactive`; None: it acts in all stages.
 
     Raises:
         InputError: an emissivity or view factor that is not between 0 and 1, or a value that is neither a finite number
@@ -163,9 +194,9 @@ class Radiation(_Boundary):
     temperatures = ("heater",)
     quadrature_degree = 9                          # T^4 on P2 edges
 
-    def __init__(self, on: str, *, emissivity: float | Table, heater: float | Table, view_factor: float | Table = 1.0,
-                 stefan_boltzmann: float = STEFAN_BOLTZMANN):
-        super().__init__(on, emissivity=emissivity, heater=heater, view_factor=view_factor,
+    def __init__(self, on: str, *, emissivity: Parameter, heater: Parameter, view_factor: Parameter = 1.0,
+                 stefan_boltzmann: float = STEFAN_BOLTZMANN, name: str | None = None):
+        super().__init__(on, name, emissivity=emissivity, heater=heater, view_factor=view_factor,
                          stefan_boltzmann=positive(f"Radiation({on!r}): stefan_boltzmann", stefan_boltzmann))
         self._check_range("emissivity", 0.0, 1.0)
         self._check_range("view_factor", 0.0, 1.0)
@@ -193,7 +224,8 @@ class HeatFlux(_Boundary):
 
     Args:
         on: name of the boundary.
-        flux: heat per time and deformed area, number or `table` over the reference radius; positive into the body.
+        flux: heat per time and deformed area, number, `table` over the reference radius, or `zones`; positive into the body.
+        name: name of the law, for `Stage.inactive`; None: it acts in all stages.
 
     Raises:
         InputError: a flux that is neither a finite number nor a table.
@@ -202,8 +234,8 @@ class HeatFlux(_Boundary):
     HeatFlux('top', flux=0.001)
     """
 
-    def __init__(self, on: str, *, flux: float | Table):
-        super().__init__(on, flux=flux)
+    def __init__(self, on: str, *, flux: Parameter, name: str | None = None):
+        super().__init__(on, name, flux=flux)
 
     def flux(self, T, absolute_zero, flux):
         """Return the prescribed heat flux into the face.
@@ -224,7 +256,7 @@ class FixedTemperature(_Boundary):
 
     Args:
         on: name of the boundary.
-        temperature: temperature of the face, number or `table` over the reference radius.
+        temperature: temperature of the face, number, `table` over the reference radius, or `zones`.
 
     Raises:
         InputError: a temperature that is neither a finite number nor a table.
@@ -235,8 +267,8 @@ class FixedTemperature(_Boundary):
 
     temperatures = ("temperature",)
 
-    def __init__(self, on: str, *, temperature: float | Table):
-        super().__init__(on, temperature=temperature)
+    def __init__(self, on: str, *, temperature: Parameter):
+        super().__init__(on, None, temperature=temperature)
 
 
 class Absorption:
@@ -252,6 +284,7 @@ class Absorption:
         on: name of the boundary through which the radiation enters.
         flux: incoming radiation q, heat per time and deformed area.
         coefficient: absorption coefficient a, 1/length, positive.
+        name: name of the law, for `Stage.inactive`; None: it acts in all stages.
 
     Raises:
         InputError: a negative flux, or a coefficient that is not positive.
@@ -260,10 +293,11 @@ class Absorption:
     Absorption('top', flux=0.002, coefficient=1.5)
     """
 
-    def __init__(self, on: str, *, flux: float, coefficient: float):
-        self.on = on
+    def __init__(self, on: str, *, flux: float, coefficient: float, name: str | None = None):
+        self.on, self.name = on, law_name("Absorption", on, name)
         self.flux = non_negative(f"Absorption({on!r}): flux", flux)
         self.coefficient = positive(f"Absorption({on!r}): coefficient", coefficient)
 
     def __repr__(self) -> str:
-        return f"Absorption({self.on!r}, flux={self.flux!r}, coefficient={self.coefficient!r})"
+        named = f", name={self.name!r}" * bool(self.name)
+        return f"Absorption({self.on!r}, flux={self.flux!r}, coefficient={self.coefficient!r}{named})"

@@ -63,7 +63,7 @@ def _biot_factor(biot: float) -> float:
 def coarse_layers(body: Any) -> Iterator[Finding]:
     """Yield a warning for the chilled face with the largest error of too few layers below it; collective."""
     scene = body.scene
-    if scene.heat is None:
+    if scene.heat is None or scene.kinematics.components == 3:      # a sheet has columns of its own
         return
     conductivity = min(m.conductivity for m in checked_materials(scene.mesh, scene.heat.materials).values())
     found = []
@@ -201,7 +201,8 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
     states = path.segments[-1].states
     for k, history in enumerate(path.problem.histories):
         if isinstance(history, CoolingHistory):
-            temperatures = [state.history_variables[k].temperature for state in states]
+            limits = path.problem.temperature.limits             # elements overshoot next to a chilled face
+            temperatures = [np.clip(state.history_variables[k].temperature, *limits) for state in states]
             local = [f(T) for T in temperatures if len(T) for f in (np.min, np.max)]
             ends = [value for part in path.problem.comm.allgather(local) for value in part]
             found = _outside_known_range(path.problem.scene, min(ends), max(ends), "the run brought it")

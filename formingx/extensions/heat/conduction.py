@@ -73,6 +73,7 @@ class Conduction(HeatVectors):
                                metadata={"quadrature_degree": 2 * degree + 2})
         self._scale, self._c = self.constant(1.0), self.constant(1.0)
         self.power: Any = 0.0
+        self._shares: dict[int, fem.Constant] = {}
         self._buffer = la.vector(self.space.dofmap.index_map, 1)
         self._factored_for: float | None = None
         self._displaced: Any = None
@@ -98,6 +99,11 @@ class Conduction(HeatVectors):
     def with_fixed_values(self, T: np.ndarray) -> np.ndarray:
         """Return temperatures, shape (n,), with the prescribed values at nodes of `FixedTemperature` faces."""
         return np.where(self._fixed_mask, self._fixed_values.x.array[: self._n], T)
+
+    def set_inactive(self, laws: Sequence[Any]) -> None:
+        """Leave out some laws of heat, which must have names; `update` must follow."""
+        for law, share in self._shares.items():
+            share.value = float(not any(law == id(item) for item in laws))
 
     def update(self) -> None:
         """Update areas of tool contacts and depths of absorption after a change of displacement or contact."""
@@ -253,12 +259,12 @@ class Conduction(HeatVectors):
         for law in self._laws:
             ds = self._ds(law.on, {"quadrature_degree": law.quadrature_degree})
             parameters = {name: self._coefficient(value) for name, value in law.parameters.items()}
-            flux = law.flux(T, self.constant(self._zero), **parameters)
+            flux = self._share_of(law) * law.flux(T, self.constant(self._zero), **parameters)
             R += self._scale * flux * self._area * v * ds
             scalars.append(self._scale * flux * self._area * ds)
         for source, depth in self._sources:
             kappa = self.constant(source.coefficient)
-            heat = self.constant(source.flux) * kappa * ufl.exp(-kappa * depth) * J * self._weight * self._scale
+            heat = self._share_of(source) * self.constant(source.flux) * kappa * ufl.exp(-kappa * depth) * J * self._weight * self._scale
             R += heat * v * self._dx
             scalars.append(heat * self._dx)
         tangent = self._stored(materials, ufl.TrialFunction(self.space), v) - self._c * ufl.derivative(R, T)
@@ -271,6 +277,12 @@ class Conduction(HeatVectors):
         self._matrix = fem_petsc.create_matrix(self._tangent)
         self._rhs, self._out = self._matrix.createVecRight(), self._matrix.createVecRight()
         self._solver = DirectSolver(self._matrix, symmetric=False)
+
+    def _share_of(self, law: Any) -> Any:
+        """Return the factor of a law of heat: a `Constant` that is 0 while the law is inactive; 1 without a name."""
+        if law.name is None:
+            return 1
+        return self._shares.setdefault(id(law), self.constant(1.0))
 
     def _coefficient(self, value: float | Table) -> Any:
         """Return a parameter of a law, a number or a table over R, as a UFL scalar: the table is evaluated at R."""

@@ -8,9 +8,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import InputError, as_list, check_name, check_type, positive
-from ...values.table import Table
 from ...values.temperature import ABSOLUTE_ZERO
-from .boundaries import Convection, FixedTemperature, ThermalProperties
+from .boundaries import Convection, FixedTemperature, ThermalProperties, numbers_of
 from .contact import ConductingTool, ContactWithTool
 from .cooling_history import CoolingHistory
 from .run import checked_boundaries, checked_materials
@@ -96,12 +95,14 @@ class Cooling:
             scene: the `Scene`.
 
         Raises:
-            InputError: the scene has no temperature or is a membrane, or a law, tool, material or `work_to_heat` does
-                not fit.
+            InputError: the scene has no temperature, or is a membrane in a section; or a law, tool, material or
+                `work_to_heat` does not fit.
         """
         if scene.temperature is None:
             raise InputError("Scene: heat: the body needs a temperature to begin with: temperature=...")
-        if not scene.model.solid:
+        if scene.kinematics.components == 3:
+            scene.kinematics.scene_checks.check_heat(scene, self)
+        elif not scene.model.solid:
             raise InputError("Scene: heat: a membrane has no thickness to conduct through: use a solid model")
         if self.work_to_heat and not any(material.internal for material in scene.materials.values()):
             raise InputError(f"Scene: heat: work_to_heat = {self.work_to_heat:g}: no material of the scene dissipates"
@@ -150,16 +151,17 @@ class Cooling:
         """
         return thickness**2 / min(m.diffusivity for m in checked_materials(mesh, self.materials).values())
 
-    def history(self, problem: Any) -> CoolingHistory:
+    def history(self, problem: Any) -> Any:
         """Return the history variables of the temperature for a run.
 
         Args:
             problem: the `Problem` of the run.
 
         Returns:
-            A `CoolingHistory`.
+            A `CoolingHistory`, or the history that the formulation of the body makes (`heat_history`).
         """
-        return CoolingHistory(self, problem)
+        make = getattr(problem.forms, "heat_history", CoolingHistory)
+        return make(self, problem)
 
     def extremes(self, scene: Any) -> tuple[float, float]:
         """Return bounds of the temperature of the body by the maximum principle, without heating by work; collective.
@@ -190,8 +192,7 @@ class Cooling:
         for law in [*self.boundaries, *self.contacts_with_tools(scene)]:
             given = np.inf if isinstance(law, FixedTemperature) else getattr(law, "conductance", None) or getattr(
                 law, "parameters", {}).get("h", 0.0)
-            value = float(np.max(given.y)) if isinstance(given, Table) else float(given)
-            found[law.on] = max(value, found.get(law.on, 0.0))
+            found[law.on] = max(*numbers_of(given), found.get(law.on, 0.0))
         return {on: value for on, value in found.items() if value}
 
     def conducts(self, contact: Any) -> bool:
@@ -237,7 +238,5 @@ def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, fl
             return -np.inf, np.inf
         touches = isinstance(law, ContactWithTool)
         for value in [law.tool] if touches else [law.parameters[name] for name in law.temperatures]:
-            found: Any = (value.y.tolist() if isinstance(value, Table) else
-                          [value.back, value.start] if isinstance(value, ConductingTool) else [value])
-            temperatures += found
+            temperatures += [value.back, value.start] if isinstance(value, ConductingTool) else numbers_of(value)
     return min(temperatures), max(temperatures)

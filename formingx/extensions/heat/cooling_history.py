@@ -71,14 +71,18 @@ class CoolingHistory:
         self._body = self._conduction()
         self._contacts = self._tool_contacts(self._body)
         self._n = len(self._body.points)
-        self._first = scene.temperature.T.x.array[: self._n]
+        self._first = self._initial_temperatures()
         self._seen: Any = None                              # temperature seen by the field and its coefficients
         low, high = cooling.extremes(scene)
         self._field.limits = low, np.inf if cooling.work_to_heat else high
         self._dissipated = self._body.source(forms.dissipated) if cooling.work_to_heat else None
         self.start()
 
-    def _conduction(self, degree: int = 2) -> Conduction:
+    def _initial_temperatures(self) -> np.ndarray:
+        """Return the initial temperatures of the body, locally owned entries, shape (n,)."""
+        return np.asarray(self._problem.scene.temperature.T.x.array[: self._n])
+
+    def _conduction(self, degree: int = 2) -> Any:
         """Return the heat equation of the deformed body; `degree`: polynomial degree of the temperature in an element.
         """
         scene, zero = self._problem.scene, ABSOLUTE_ZERO[self._cooling.unit]
@@ -86,12 +90,12 @@ class CoolingHistory:
         return Conduction(scene.mesh, checked_materials(scene.mesh, self._cooling.materials),
                           checked_boundaries(scene.mesh, laws, zero), scene.kinematics, zero, self._forms.u, degree)
 
-    def _tool_contacts(self, body: Conduction) -> list[tuple[Any, Any, np.ndarray]]:
+    def _tool_contacts(self, body: Any) -> list[tuple[Any, Any, np.ndarray]]:
         """Return (`HeatContact`, contact of the problem, nodal conductances in contact (n,)) for each tool with heat.
         """
         contacts = [c for c in self._problem.contacts if self._cooling.conducts(c.contact)]
-        return [(touch, contact, touch.conductance.copy())
-                for touch, contact in zip(body.tool_contacts, contacts, strict=True)]
+        touching = body.tool_contacts[len(body.tool_contacts) - len(contacts):]      # after each `ContactWithTool`
+        return [(touch, contact, touch.conductance.copy()) for touch, contact in zip(touching, contacts, strict=True)]
 
     def errors_in_space(self, states: Sequence[Any]) -> np.ndarray:
         """Estimate the discretisation errors of the temperature in states of the run; collective.
@@ -207,6 +211,7 @@ class CoolingHistory:
             self._body.power, self._power = (self._power + power) / 2, power
         if until <= self._time:
             return
+        self._body.set_inactive(self._inactive_laws())
         _set_conductances(self._body, self._contacts, control)
         self._before = self._time, self._state[0]
         if start is not None:
@@ -221,6 +226,13 @@ class CoolingHistory:
         self._integrate(until)
         self._problem.set_fields(x)
         self._update_problem()
+
+    def _inactive_laws(self) -> list[Any]:
+        """Return the laws of heat that are inactive in the current stage."""
+        scene, laws = self._problem.scene, self._cooling.boundaries
+        inactive = self._problem.setting.inactive
+        first = len(scene.items) + 1
+        return [laws[number - first] for number in scene.heat_laws.values() if number in inactive]
 
     def _integrate(self, until: float) -> None:
         """Solve the heat equation up to the time `until`, with the body at a fixed position."""
@@ -331,18 +343,26 @@ class CoolingHistory:
         seen = self._time, T, before
         if combined(self._problem.comm, int(self._seen is None or not _equal(seen, self._seen))):
             self._seen = seen
-            field.T.x.array[: self._n] = T
-            field.T.x.scatter_forward()
-            field.time, field.before = self._time, None
+            self._set_field(T, None if before is None else before[1])
+            field.time = self._time
             if before is not None:
-                earlier = field.T.copy()
-                earlier.x.array[: self._n] = before[1]
-                earlier.x.scatter_forward()
-                field.time_before, field.before = before[0], earlier.x.array
+                field.time_before = before[0]
             self._problem.update_temperature()
 
+    def _set_field(self, T: np.ndarray, before: np.ndarray | None) -> None:
+        """Set the temperature of the problem, now and before, from locally owned entries, shape (n,); None: unknown."""
+        field = self._field
+        field.T.x.array[: self._n] = T
+        field.T.x.scatter_forward()
+        field.before = None
+        if before is not None:
+            earlier = field.T.copy()
+            earlier.x.array[: self._n] = before
+            earlier.x.scatter_forward()
+            field.before = earlier.x.array
 
-def _set_conductances(body: Conduction, tool_contacts: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
+
+def _set_conductances(body: Any, tool_contacts: Sequence[tuple[Any, Any, np.ndarray]], control: float) -> None:
     """Set the conductance of each contact node; 0 if the tool is absent or away from the node in the state."""
     u = body.displacements()
     for touch, contact, conductance in tool_contacts:

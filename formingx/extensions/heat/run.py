@@ -15,10 +15,9 @@ from ...mesh import Mesh
 from ...mesh.nodes import dof_positions, span
 from ...physics.kinematics import Axisymmetric
 from ...scene import fields
-from ...values.table import Table
 from ...values.temperature import ABSOLUTE_ZERO
 from . import stepping
-from .boundaries import Absorption, FixedTemperature, Radiation, ThermalProperties, is_implausible
+from .boundaries import Absorption, FixedTemperature, Radiation, ThermalProperties, is_implausible, numbers_of
 from .conduction import Conduction
 from .layers import layered
 from .result import HeatRun
@@ -220,7 +219,7 @@ def implausible_radiation(materials: Iterable[ThermalProperties], boundaries: It
     conductivity = min(material.conductivity for material in materials)
     for law in boundaries:
         if isinstance(law, Radiation):
-            sigma, hottest = (float(np.max(given.y if isinstance(given, Table) else given))
+            sigma, hottest = (max(numbers_of(given))
                               for given in map(law.parameters.__getitem__, ("stefan_boltzmann", "heater")))
             biot = 4 * sigma * (hottest - zero)**3 * thickness / conductivity
             if is_implausible(biot):

@@ -62,7 +62,7 @@ class LaggedFriction(LaggedStick):
 
     Args:
         tool: tool with a method `distances` (see `Distances`).
-        mu: coefficient of friction, 0 for contact without friction.
+        mu: coefficient of friction, shape () or (n,), 0 for contact without friction.
         k: penalty, stress/length.
         theta: a point is in contact where its signed distance exceeds -theta, length.
         elastic_slip: elastic slip at which a point begins to slide, length.
@@ -71,7 +71,7 @@ class LaggedFriction(LaggedStick):
     tool: Any
     sticks = False
 
-    def __init__(self, tool: Any, mu: float, k: Any, theta: float, elastic_slip: float):
+    def __init__(self, tool: Any, mu: np.ndarray | float, k: Any, theta: float, elastic_slip: float):
         super().__init__(tool, k, theta, True)
         self.mu, self.elastic_slip = mu, elastic_slip
         self._last: tuple[np.ndarray, Distances] | None = None
@@ -79,7 +79,15 @@ class LaggedFriction(LaggedStick):
 
     def part(self, points: np.ndarray | slice) -> LaggedFriction:
         """Return the contact law of some of the points, numbers of shape (m,) or a slice."""
-        return LaggedFriction(self.tool, self.mu, self.k, self.theta, self.elastic_slip)
+        return LaggedFriction(self.tool, self._mu_at(points), self.k, self.theta, self.elastic_slip)
+
+    def with_friction(self, mu: np.ndarray | float) -> LaggedFriction:
+        """Return a copy of the law with the coefficient of friction mu, shape () or (n,)."""
+        return LaggedFriction(self.tool, mu, self.k, self.theta, self.elastic_slip)
+
+    def _mu_at(self, points: np.ndarray | slice) -> np.ndarray | float:
+        """Return the coefficient of friction of some of the points, numbers of shape (m,) or a slice."""
+        return self.mu[points] if isinstance(self.mu, np.ndarray) and self.mu.ndim else self.mu
 
     def in_tension(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
         """Return the mask of the points in contact that lie outside the tool, shape (n,); x: shape (n, 3), length."""
@@ -130,12 +138,13 @@ class LaggedFriction(LaggedStick):
         along = np.einsum("ni,ni->n", n, moved)
         g = moved - along[:, None] * n
         size, basis = np.linalg.norm(g, axis=1), _basis(n)
-        slides = (size > self.elastic_slip) & (self.mu > 0)
+        mu = self._mu_at(rows)
+        slides = (size > self.elastic_slip) & (mu > 0)
         if sense is not None:
             before = np.cos(sense[rows, None]) * basis[0] + np.sin(sense[rows, None]) * basis[1]
             slides &= (sense[rows] == 0) | (np.einsum("ni,ni->n", before, g) > 0)
         way = np.where(slides[:, None], g, 0.0) / np.maximum(size, 1e-300)[:, None]
-        stiff = self.mu * self.friction_pressure(old)[rows] / np.where(slides, size, self.elastic_slip)
+        stiff = mu * self.friction_pressure(old)[rows] / np.where(slides, size, self.elastic_slip)
 
         def stiffness() -> np.ndarray:
             """Return the derivative of the tractions with respect to the positions, shape (n, 3, 3), stress/length."""

@@ -206,7 +206,8 @@ class LaggedApproach(Approach):
     @property
     def has_lagged_friction(self) -> bool:
         """True if friction is lagged: the pressure of the last accepted state bounds the friction in the step."""
-        return bool(0 < self.face.law.mu < np.inf)
+        mu = np.max(self.face.law.mu, initial=0.0)
+        return bool(combined(self._comm, bool(0 < mu < np.inf), MPI.LOR))
 
     def change_of_pressure(self, new: np.ndarray, control: float) -> float:
         """Return the relative change of contact pressure in a step; 0 without lagged friction; new: shape (n,)."""

@@ -23,6 +23,10 @@ The sheet may be a quarter of the whole.
 """
 
 
+_SAME_SHARE = 1e-9
+"""Largest difference between two shares of a layer in the thickness of a sheet that count as equal."""
+
+
 def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
     """Return {layer: reference thickness as a function of arrays (x, y, z)}, positive at all nodes; collective.
 
@@ -89,15 +93,15 @@ def _check(name: str, function: _OfPosition, X: np.ndarray) -> None:
 def refuse(scene: Any, heat: Any) -> None:
     """Raise an `InputError` for parts of a scene that are not available in three dimensions.
 
-    They are a model other than a membrane, heat conduction, a centrifugal load, a pressure on an edge, a pinned node,
-    and a `Symmetry` of an edge that does not lie in a plane normal to its axis.
+    They are a model other than a membrane, a centrifugal load, a pressure on an edge, a pinned node, a `Symmetry` of an
+    edge that does not lie in a plane normal to its axis, and thermal expansion together with heat conduction.
     """
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in three dimensions is a Membrane(): solids in three"
                          f" dimensions are not available yet")
-    if heat is not None:
-        raise InputError("Scene: heat: is not available in three dimensions yet: give a temperature=... that stays as"
-                         " it is")
+    if heat is not None and scene.expansion:
+        raise InputError("Scene: expansion: a sheet in three dimensions with heat=... keeps its volume: leave expansion"
+                         " out")
     for load in scene.loads:
         if isinstance(load, CentrifugalLoad):
             raise InputError(f"Scene: {load!r}: it spins about the axis of an axisymmetric body, which a sheet in"
@@ -111,6 +115,34 @@ def refuse(scene: Any, heat: Any) -> None:
                              " nodes")
         if isinstance(support, Symmetry) and support.on in scene.mesh.boundaries:
             _check_plane(scene, support)
+
+
+def check_heat(scene: Any, cooling: Any) -> None:
+    """Raise an `InputError` for heat conduction (`Cooling`) that a sheet in three dimensions does not have; collective.
+
+    Heat flows through its thickness only, so a law belongs to one of its two faces. A prescribed temperature of a face,
+    heating by work, and layers whose shares of the thickness vary from place to place are not available.
+    """
+    faces = " or ".join(map(repr, scene.mesh.faces))
+    for law in cooling.boundaries:
+        on = getattr(law, "on", None)
+        if on in scene.mesh.boundaries and on not in scene.mesh.faces:
+            raise InputError(f"Cooling: {law!r}: {on!r} is an edge, and heat flows through the thickness of a sheet in"
+                             f" three dimensions only: must be on {faces}, or left out")
+        if type(law).__name__ == "FixedTemperature":
+            raise InputError(f"Cooling: {law!r}: a face of a sheet in three dimensions has no prescribed temperature:"
+                             f" use ContactWithTool({on!r}, conductance=..., tool=...)")
+    if cooling.work_to_heat is not None:
+        raise InputError(f"Cooling: work_to_heat = {cooling.work_to_heat:g}: a sheet in three dimensions is not heated"
+                         f" by its work: leave it out")
+    x = scene.mesh.domain.geometry.x.T
+    h = np.array([np.broadcast_to(given(*x), x.shape[1]) for given in scene.thickness.values()])
+    shares = gathered(scene.mesh.comm, (h / h.sum(0)).T)
+    if np.ptp(shares, axis=0).max() > _SAME_SHARE:
+        name = list(scene.thickness)[int(np.argmax(np.ptp(shares, axis=0)))]
+        k = list(scene.thickness).index(name)
+        raise InputError(f"Scene: thickness of {name!r}: is from {shares[:, k].min():.4g} to {shares[:, k].max():.4g} of"
+                         f" the sheet: with heat=... each layer must be the same share of the thickness everywhere")
 
 
 def _check_plane(scene: Any, support: Symmetry) -> None:
@@ -138,9 +170,6 @@ def check_contact(scene: Any, contact: Any) -> None:
     if contact.on not in mesh.faces:
         raise InputError(f"{contact!r}: a surface in three dimensions touches with its"
                          f" {' or its '.join(map(repr, mesh.faces))}")
-    if contact.friction_by_temperature:
-        raise InputError(f"{contact!r}: in three dimensions friction does not depend on the temperature yet: must be"
-                         f" 'stick', 'none' or one coefficient")
     if not contact.sticks and not contact.separates:
         raise InputError(f"{contact!r}: separates = False: a sheet in three dimensions that slides separates where it"
                          f" is in tension: must be 'stick', or without separates=False")

@@ -24,6 +24,7 @@ tension, W_r is the energy at that stretch; where l1 < 1 it is 0.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any
 
@@ -32,11 +33,15 @@ import numpy as np
 import ufl
 from dolfinx import fem
 
+from ...forms.energy_rule import EnergyRule
 from ...forms.formulation import Formulation
 from ...forms.membrane import FIRST_STRETCH
 from ...forms.probes import Probe
 from ...physics.loads import Pressure
 from ...values.tolerances import NEGLIGIBLE
+from .heat.basis import ColumnBasis, basis_of
+from .heat.linear import is_linear
+from .heat.temperature import ColumnTemperature
 from .pressure_on_tools import PressureOnTools
 
 _REGULARISING_STIFFNESS = 1e-7
@@ -111,6 +116,51 @@ class Surface(Formulation):
         The area is in the first of the three entries of a node, the others are 0."""
         ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
         return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
+
+    @property
+    def heat_history(self) -> Any:
+        """Class of the history of temperatures of a sheet with heat conduction (`Cooling`)."""
+        from .heat.column_history import ColumnHistory
+        return ColumnHistory
+
+    @cached_property
+    def _columns(self) -> ColumnBasis | None:
+        """Basis of the temperatures through the thickness; None without heat conduction."""
+        return None if self.scene.heat is None else basis_of(self.scene, self.scene.heat.materials)
+
+    @cached_property
+    def _energy_by_depth(self) -> bool:
+        """True if the energy is integrated over the points of a column; False if the mean of the constants will do."""
+        return self._columns is not None and not all(is_linear(self.scene, name) for name in self.scene.mesh.layers)
+
+    def _energy_rule(self) -> EnergyRule:
+        rule = super()._energy_rule()
+        if self._columns is None or not self._energy_by_depth:
+            return rule
+        return rule.through(next(iter(self._columns.layers.values())).weights)       # each layer has the same points
+
+    def _make_temperature(self) -> Any:
+        if self._columns is None:
+            return super()._make_temperature()
+        return ColumnTemperature(self.scene.temperature, self, self._columns)
+
+    def temperatures(self, terms: Any) -> np.ndarray:
+        """Return the temperatures at the quadrature points of `terms`, now and before, shape (1 or 2, cells, q).
+
+        If the mean of the constants will do, the temperatures of the m points of a column follow in a fourth index.
+        """
+        if self._columns is None:
+            return super().temperatures(terms)
+        layer = terms.names[0]
+        m = len(self._columns.layers[layer].weights)
+        found = self.temperature.last_two_states(terms.cells, terms.places[::m if self._energy_by_depth else 1], layer)
+        return found.reshape(*found.shape[:2], -1) if self._energy_by_depth else found
+
+    def mean_over_depths(self, law: Callable, terms: Any) -> Callable:
+        if self._columns is None or self._energy_by_depth:
+            return law
+        weights = self._columns.layers[terms.names[0]].weights
+        return lambda T: law(T) @ weights
 
     def _make_mesh(self) -> Any:
         return self.scene.mesh

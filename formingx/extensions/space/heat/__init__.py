@@ -1,0 +1,1 @@
+"""Heat conduction through the thickness of sheets in three dimensions."""
