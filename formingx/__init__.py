@@ -56,7 +56,7 @@ from .units import Units
 from .values.amplitude import amplitude
 from .values.table import table
 from .values.temperature import WLF, Arrhenius
-from .values.zones import Zones, zones
+from .values.zones import zones
 
 # Each extension adds its names and takes part by the interfaces of the core; its folder may be taken out.
 with _optional():

@@ -565,8 +565,6 @@ def test_moulds_from_files_fill(make, tmp_path):
 
 
 @pytest.mark.parametrize("make, words", [
-    (lambda: disc(temperature=50.0, contacts=[fx.Contact("top", fx.tools.revolved(fx.tools.sphere(
-        radius=1.0, z=0.0)), fx.table({20.0: 0.2, 100.0: 0.3}))]), "friction does not depend on the temperature yet"),
     (lambda: trough(friction="none", separates=False), "a sheet in three dimensions that slides separates"),
     (lambda: trough(friction=0.3, separates=False), "a sheet in three dimensions that slides separates"),
     (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.revolved(fx.tools.plane(-1.0).reversed()), "none",

@@ -31,6 +31,7 @@ class EnergyRule(NamedTuple):
     def of_degree(cls, cell: Any, degree: int) -> Self:
         """Return the default rule of a polynomial degree."""
         places: Any
+        weights: Any
         places, weights = basix.make_quadrature(cell, degree)
         return cls(cell, places, weights, {"quadrature_degree": degree}, {"scheme": "default", "degree": degree})
 

@@ -34,8 +34,9 @@ class Stage:
             tables. With a `duration` and no control it ends the stage early, such as `sag(30.0)`.
         intermediate: further targets to meet exactly during the stage; targets that are not met are left out.
         inactive: items that are inactive during the stage, themselves or their names, such as a support, a tool or a
-            load. Laws of heat take part by their names, such as the heater of an oven. A support that becomes active again constrains the body at its current position. A load that becomes
-            active again has its last value; its column is 0 while it is inactive.
+            load. Laws of heat take part by their names, such as the heater of an oven. A support that becomes active
+            again constrains the body at its current position. A load that becomes active again has its last value; its
+            column is 0 while it is inactive.
         amplitudes: instead of `control`: {item: [(time, value), ...]}, piecewise linear in time, values in the user's
             units; the last value stays. If a table begins later than the stage, the item changes linearly from its
             current value. With `control`, the key is not an item but a function that makes targets, such as

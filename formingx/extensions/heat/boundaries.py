@@ -117,9 +117,9 @@ class _Boundary:
             if name in self.temperatures:
                 self._check_range(name, absolute_zero)
             if isinstance(value, Table if in_space else Zones):
-                raise InputError(f"{self!r}: {name}: {f'a sheet in three dimensions takes zones over x and y: use'
-                                 f' fx.zones(x, y, values)' if in_space else
-                                 'a section takes a table over R: use fx.table({R: value})'}")
+                allowed = ("a sheet in three dimensions takes fx.zones(x, y, values)" if in_space else
+                           "a section takes a table over R, fx.table({R: value})")
+                raise InputError(f"{self!r}: {name}: {allowed}")
             if isinstance(value, Table):
                 value.check(mesh.nodes_of(self.on)[:, 0], f"R on {self.on!r}")
 
@@ -136,7 +136,8 @@ class Convection(_Boundary):
 
     Args:
         on: name of the boundary.
-        h: heat transfer coefficient, heat per time, area and degree, number, `table` over the reference radius, or `zones`.
+        h: heat transfer coefficient, heat per time, area and degree, number, `table` over the reference radius, or
+            `zones`.
         air: temperature of the air, number, `table` over the reference radius, or `zones`.
         name: name of the law, for `Stage.inactive`; None: it acts in all stages.
 
@@ -224,7 +225,8 @@ class HeatFlux(_Boundary):
 
     Args:
         on: name of the boundary.
-        flux: heat per time and deformed area, number, `table` over the reference radius, or `zones`; positive into the body.
+        flux: heat per time and deformed area, number, `table` over the reference radius, or `zones`; positive into the
+            body.
         name: name of the law, for `Stage.inactive`; None: it acts in all stages.
 
     Raises:

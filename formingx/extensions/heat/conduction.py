@@ -264,7 +264,8 @@ class Conduction(HeatVectors):
             scalars.append(self._scale * flux * self._area * ds)
         for source, depth in self._sources:
             kappa = self.constant(source.coefficient)
-            heat = self._share_of(source) * self.constant(source.flux) * kappa * ufl.exp(-kappa * depth) * J * self._weight * self._scale
+            flux = self._share_of(source) * self.constant(source.flux)
+            heat = flux * kappa * ufl.exp(-kappa * depth) * J * self._weight * self._scale
             R += heat * v * self._dx
             scalars.append(heat * self._dx)
         tangent = self._stored(materials, ufl.TrialFunction(self.space), v) - self._c * ufl.derivative(R, T)

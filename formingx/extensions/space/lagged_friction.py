@@ -69,6 +69,7 @@ class LaggedFriction(LaggedStick):
     """
 
     tool: Any
+    mu: Any
     sticks = False
 
     def __init__(self, tool: Any, mu: np.ndarray | float, k: Any, theta: float, elastic_slip: float):

@@ -141,8 +141,9 @@ def check_heat(scene: Any, cooling: Any) -> None:
     if np.ptp(shares, axis=0).max() > _SAME_SHARE:
         name = list(scene.thickness)[int(np.argmax(np.ptp(shares, axis=0)))]
         k = list(scene.thickness).index(name)
-        raise InputError(f"Scene: thickness of {name!r}: is from {shares[:, k].min():.4g} to {shares[:, k].max():.4g} of"
-                         f" the sheet: with heat=... each layer must be the same share of the thickness everywhere")
+        raise InputError(f"Scene: thickness of {name!r}: is from {shares[:, k].min():.4g} to"
+                         f" {shares[:, k].max():.4g} of the sheet: with heat=... each layer must be the same share of"
+                         f" the thickness everywhere")
 
 
 def _check_plane(scene: Any, support: Symmetry) -> None:

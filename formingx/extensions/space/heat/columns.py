@@ -256,7 +256,7 @@ class _FaceLaw:
         self._parameters: Mapping[str, Any] = {
             name: np.broadcast_to(value(*points[:, :2].T) if isinstance(value, Zones) else value, len(points))
             for name, value in law.parameters.items()}
-        self._slope = np.zeros(len(points))
+        self._slope: Any = np.zeros(len(points))
 
     def flux(self, T: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the flux into the face at temperatures T, shape (n,), and its derivative by T, shape (n,)."""

@@ -42,7 +42,7 @@ class ColumnTemperature:
         self.time = self.time_before = 0.0
         self.limits = (-np.inf, np.inf)
         self._domain, self._size = surface.domain, surface.length
-        self._element = basix.ufl.element("Lagrange", surface.domain.basix_cell().name, 1)
+        self._element: Any = basix.ufl.element("Lagrange", surface.domain.basix_cell().name, 1)
 
     def last_two_states(self, cells: np.ndarray, places: np.ndarray, layer: str) -> np.ndarray:
         """Return temperatures at q places of cells and the points of a layer, now and before, within `limits`.
