@@ -39,20 +39,23 @@ def limit_of(elements, part="quarter"):
 
 
 def test_free_inflation_converges_to_membrane_theory():
-    """A ring of chords of half angle a carries 1/cos(a) times the pressure of a circle; the rest is of second order."""
+    """A ring of chords of half angle a that encloses the area of its circle carries p sqrt(a tan a) / a = 1 + a^2/6.
+
+    The rest, of chords along the meridian, is of second order, too. Nodes on the circle give 1/cos(a), and a pressure
+    that is 0.66 % too large at 27 x 8.
+    """
     pressure, volume = limit_point()
     assert (pressure, volume) == (pytest.approx(0.91071, abs=1e-5), pytest.approx(2.7368, abs=2e-4))
     coarse, fine = (np.array(limit_of(elements)) / (pressure, volume) - 1 for elements in ((14, 4), (27, 8)))
-    assert 0 < fine[0] < 7e-3 and abs(fine[1]) < 1e-3
+    assert 0 < fine[0] < 5e-3 and abs(fine[1]) < 1e-3
     assert np.log2(coarse[0] / fine[0]) == pytest.approx(2, abs=0.2)
-    assert fine[0] - (1 / np.cos(np.pi / 32) - 1) == pytest.approx(1.7e-3, abs=1e-4)
 
 
 @pytest.mark.thorough
 def test_free_inflation_on_a_fine_mesh_and_parts():
     pressure, volume = limit_point()
     fine = np.array(limit_of((53, 16))) / (pressure, volume) - 1
-    assert 0 < fine[0] < 2e-3 and abs(fine[1]) < 2e-4
+    assert 0 < fine[0] < 1.1e-3 and abs(fine[1]) < 2e-4
     quarter, half, whole = (limit_of((20, columns), part) for columns, part in (
         (6, "quarter"), (12, "half"), (24, "whole")))
     assert half == pytest.approx(quarter, rel=1e-6) and whole == pytest.approx(quarter, rel=1e-6)
@@ -94,12 +97,37 @@ def test_meshes_of_parts_have_named_edges_and_faces():
         points, normals = mesh.outward("outer")
         assert np.einsum("ni,ni->n", points[:, :2], normals[:, :2]).min() > 1.9
         n = 8 * {"whole": 1, "half": 2, "quarter": 4}[part]
-        assert mesh.enclosed_volume() * n / 8 == pytest.approx(9 * n / 2 * 4 * np.sin(2 * np.pi / n))
+        assert mesh.enclosed_volume() * n / 8 == pytest.approx(9 * np.pi * 4)
     closed = fx.mesh.tube(**CAPPED)
     assert list(closed.boundaries) == ["neck", "x0", "y0", "inner", "outer"]
     points, normals = closed.outward("inner")
     assert normals[np.argmin(points[:, 2]), 2] > 0.8
     assert fx.mesh.sheet([(0, 0), (1, 0), (1, 1)], size=0.5).flat
+
+
+def test_ring_in_plane_strain_has_the_pressure_of_its_circle():
+    """p R / (mu H) = (1 - l^-4) (sin a / a) sqrt(2 a / sin 2 a) at the stretch l of a ring of chords, p = dW / dV."""
+    for columns in (2, 4):
+        mesh = fx.mesh.tube(radius=1.0, length=0.5, elements=(4, columns), part="quarter")
+        ring = fx.Scene(mesh=mesh, thickness=0.01, materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
+                        supports=[fx.Symmetry("neck", "z", guide=True), fx.Symmetry("end", "z", guide=True),
+                                  *SYMMETRIES["quarter"]])
+        stretch, a = 1.5, np.pi / 4 / columns
+        path = fx.trace(ring, until=fx.enclosed_volume(0.5 * np.pi * (stretch**2 - 1)), progress=False)
+        share = np.sin(a) / a * np.sqrt(2 * a / np.sin(2 * a))
+        assert 0.85 < (path["pressure"][-1] / (0.01 * (1 - stretch**-4)) - 1) / (share - 1) < 1
+        assert share == pytest.approx(1 + a**2 / 6, abs=a**4)
+
+
+def test_points_of_the_curved_surface_are_on_its_triangles():
+    mesh = fx.mesh.tube(radius=16.0, length=40.0, elements=(8, 4), part="quarter")
+    path = fx.trace(scene(mesh), until=fx.displacement(
+        1.0, at=(16 * np.cos(0.5), 16 * np.sin(0.5), -21.0), component="x"), progress=False)
+    assert path.columns[-1] or path.last.measures
+    found = mesh.nearest(np.array([[16.0, 0.0, -20.0], [30.0, 0.0, -20.0]]))
+    assert np.hypot(*found[0, :2]) == pytest.approx(16.0, abs=0.25) and found[1].tolist() == [30.0, 0.0, -20.0]
+    with pytest.raises(fx.InputError, match=r"\(30, 0, -20\) is not in the mesh"):
+        fx.trace(scene(mesh), until=fx.displacement(1.0, at=(30.0, 0.0, -20.0), component="x"), progress=False)
 
 
 def test_arc_length_of_a_meridian_gives_a_thickness():

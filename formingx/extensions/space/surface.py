@@ -91,7 +91,7 @@ class Surface(Formulation):
         return self.scene.kinematics.in_axes(support, support.constraints())
 
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        return points
+        return self.mesh.nearest(points)
 
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
         return Z

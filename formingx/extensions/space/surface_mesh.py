@@ -102,6 +102,26 @@ class SurfaceMesh(Mesh):
         np.add.at(normal, triangles.ravel(), np.repeat(each, 3, axis=0))
         return points, self.faces[face] * normal / np.linalg.norm(normal, axis=1, keepdims=True)
 
+    def nearest(self, places: np.ndarray) -> np.ndarray:
+        """Return the points of a curved surface that stand for given places, such as the middle of an arc; collective.
+
+        Triangles are chords of the curved surface. A place that is farther from them than a quarter of an edge, or any
+        place on a flat sheet, is returned as it is.
+
+        Args:
+            places: coordinates (x, y, z) of the n places, shape (n, 3), length.
+
+        Returns:
+            Coordinates, shape (n, 3), length.
+        """
+        if self.flat or places.shape[1] < 3:
+            return places
+        points, triangles = self.whole()
+        corners = points[triangles]
+        found, rows, away = closest_points(places, corners)
+        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(1)[rows]
+        return np.where((away < longest / 4)[:, None], found, places)
+
     def enclosed_volume(self) -> float:
         r"""Return the volume inside the modelled surface in the reference configuration; collective.
 
@@ -143,6 +163,30 @@ class SurfaceMesh(Mesh):
         away = np.linalg.norm(points[:, None] - start - s[..., None] * edge, axis=2)
         k, before = away.argmin(1), np.concatenate([[0.0], np.cumsum(length)[:-1]])
         return np.asarray(before[k] + s[np.arange(len(k)), k] * length[k])
+
+
+def closest_points(places: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the point of a surface closest to each of n places, shape (n, 3), its triangle (n,) and distance (n,).
+
+    places: shape (n, 3), length; corners of m triangles, shape (m, 3, 3), length.
+    """
+    edges = np.roll(corners, -1, axis=1) - corners
+    normal = np.cross(edges[:, 0], edges[:, 1])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    squares = np.maximum(np.einsum("mki,mki->mk", edges, edges), 1e-300)
+    found, rows, away = np.empty_like(places), np.empty(len(places), dtype=int), np.empty(len(places))
+    for n, place in enumerate(places):
+        off = place - corners
+        height = np.einsum("mi,mi->m", off[:, 0], normal)
+        inside = (np.einsum("mki,mi->mk", np.cross(edges, off), normal) >= 0).all(1)
+        share = np.clip(np.einsum("mki,mki->mk", off, edges) / squares, 0.0, 1.0)
+        on_edges = corners + share[..., None] * edges
+        distance = np.linalg.norm(place - on_edges, axis=2)
+        distance, best = np.where(inside[:, None], np.abs(height)[:, None], distance), distance.argmin(1)
+        k = rows[n] = distance.min(1).argmin()
+        found[n] = place - height[k] * normal[k] if inside[k] else on_edges[k, best[k]]
+        away[n] = distance[k].min()
+    return found, rows, away
 
 
 def volume_within(points: np.ndarray, triangles: np.ndarray) -> float:
