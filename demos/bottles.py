@@ -32,6 +32,14 @@ def mould():
     return fx.tools.intersection(body, neck, fillet=4.0)
 
 
+def graded(divisions, place, width, low, high):
+    """Return places from `low` to `high` that are three times as dense at `place` as far from it, by its width."""
+    x = np.linspace(low, high, 2001)
+    density = 1 + 2 * np.exp(-(((x - place) / width) ** 2))
+    s = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2)])
+    return np.interp(np.linspace(0.0, s[-1], divisions + 1), s, x)
+
+
 def symmetries(mesh):
     """Return the supports of the cuts of a half or a quarter."""
     return [fx.Symmetry(name, name[0]) for name in ("x0", "y0") if name in mesh.boundaries]

@@ -124,7 +124,7 @@ def main():
     path.to_csv(args.out / "stretch_blow.csv")
     if not args.quick:
         draw_states(path, {"stretched by the rod": path.state(stage="stretch"), "blown": path.last},
-                    args.out / "stretch_blow.png", grid=8.0)
+                    args.out / "stretch_blow.png", grid=8.25)
     summarise(args.out, {**summary, "versions": files.versions()})
 
 

@@ -11,7 +11,7 @@ from test_demos import summary
 def test_square_bottle_quick(tmp_path):
     found = summary("square_bottle", tmp_path, "--quick")
     bottle, strain = found["square_bottle"], found["square_bottle"]["plane_strain"]
-    assert bottle["weight_g"] == pytest.approx(40.7, abs=0.1) and bottle["capacity_ml"] == pytest.approx(653, abs=3)
+    assert bottle["weight_g"] == pytest.approx(41.16, abs=0.1) and bottle["capacity_ml"] == pytest.approx(662, abs=3)
     assert bottle["middle_of_face_mm"]["mid_height"] == pytest.approx(strain["middle_of_face_mm"], rel=0.03)
     assert bottle["edge_mm"]["mid_height"] == pytest.approx(strain["edge_mm"], rel=0.04)
     assert bottle["least_wall_mm"] < strain["edge_mm"]
@@ -21,6 +21,7 @@ def test_square_bottle_quick(tmp_path):
 def test_square_bottle(tmp_path):
     found = summary("square_bottle", tmp_path)
     bottle, strain = found["square_bottle"], found["square_bottle"]["plane_strain"]
+    assert bottle["least_wall_mm"] == pytest.approx(0.348, rel=0.02)        # 120 x 36: the same; 168 x 48 equal: 0.352
     assert bottle["edge_mm"]["mid_height"] == pytest.approx(strain["edge_mm"], rel=0.02)
     assert bottle["middle_of_face_mm"]["mid_height"] == pytest.approx(strain["middle_of_face_mm"], rel=0.03)
     assert found["round"]["least_wall_over_solid"] == pytest.approx(1, abs=0.015)
@@ -49,7 +50,7 @@ def test_closing_halves(tmp_path):
 @pytest.mark.thorough
 def test_stretch_blow_quick(tmp_path):
     found = summary("stretch_blow", tmp_path, "--quick")
-    assert found["weight_g"] == pytest.approx(25.6, abs=0.1)
+    assert found["weight_g"] == pytest.approx(25.86, abs=0.1)
     assert found["rod_force_largest_N"] == pytest.approx(606, rel=0.02)
     assert found["least_wall_mm"] > 1.5 * found["without_rod"]["least_wall_mm"]
 

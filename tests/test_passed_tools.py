@@ -95,3 +95,39 @@ def test_test_of_passed_tools_takes_a_tenth_of_the_time(monkeypatch):
     begin = process_time()
     cavity(2.5, 0.3, 1)
     assert 0 < spent[0] < 0.1 * (process_time() - begin)
+
+
+def tube_and_pin(half, on, part):
+    """A tube with air inside, and a blade along y or a vertical finger inside that moves along x by 8."""
+    if on == "outer":
+        tool, way = fx.tools.extruded(fx.Tool([(60.0, half), (16.6, half), (16.6, -half), (60.0, -half)])), -1
+    else:
+        finger = [(0.0, -20.0), (half, -20.0), (half, 20.0), (0.0, 20.0)]
+        tool, way = fx.tools.revolved(fx.Tool(finger)).moved(x=15.0 - half, y=2.3), 1
+    supports = [fx.Symmetry(name, name[0]) for name in {"quarter": ("x0", "y0"), "half": ("x0",)}.get(part, ())]
+    columns = {"quarter": 5, "half": 10, "whole": 20}[part]
+    scene = fx.Scene(mesh=fx.mesh.tube(radius=16.0, length=80.0, elements=(20, columns), part=part), thickness=1.0,
+                     materials=MATERIAL, supports=[fx.Clamped("neck"), fx.Clamped("end"), *supports], model=WRINKLES,
+                     loads=[fx.Pressure("inner", name="air")],
+                     contacts=[fx.Contact(on, tool.moved(z=-41.7), "stick", direction=(way, 0, 0), name="pin")])
+    stages = [fx.Stage("air", control="air", until=fx.pressure(0.01)),
+              fx.Stage("push", control="pin", until=fx.travel(8.0))]
+    try:
+        return fx.Process(scene).run(stages, progress=False), ""
+    except fx.ConvergenceError as error:
+        return error.path, str(error)
+
+
+@pytest.mark.parametrize("on, part", [("outer", "quarter"), ("inner", "half"), *(pytest.param(
+    *case, marks=pytest.mark.thorough) for case in (("outer", "whole"), ("inner", "whole")))])
+def test_blade_does_not_pass_between_the_nodes_of_a_tube(on, part):
+    path, text = tube_and_pin(0.5, on, part)
+    assert "the tool of 'pin' passes through the sheet at (x, y, z) = (" in text and "smaller triangles" in text
+    assert path["pin_travel"][-1] < 8.0
+    wide, text = tube_and_pin(6.0, on, part)
+    assert not text and wide["pin_travel"][-1] == 8.0
+    x = wide.wall().deformed_points[np.abs(wide.wall().reference_points[:, 2] + 41.7) < 3.0, 0]
+    if on == "inner":
+        assert x.max() == pytest.approx(15.0 + 6.0 - 6.0 + 8.0, abs=1.0)
+    elif part == "quarter":
+        assert x.max() == pytest.approx(16.6 - 8.0, abs=0.1)

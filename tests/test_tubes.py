@@ -130,6 +130,17 @@ def test_points_of_the_curved_surface_are_on_its_triangles():
         fx.trace(scene(mesh), until=fx.displacement(1.0, at=(30.0, 0.0, -20.0), component="x"), progress=False)
 
 
+def test_rows_and_columns_may_be_lists_of_places():
+    mesh = fx.mesh.tube(radius=2.0, length=9.0, elements=([0, 0.5, 0.6, 1], [0, 40, 45, 90]), part="quarter")
+    neck = mesh.nodes_of("neck")
+    assert np.sort(np.degrees(np.arctan2(neck[:, 1], neck[:, 0]))) == pytest.approx([0, 40, 45, 90])
+    assert np.sort(mesh.nodes_of("x0")[:, 2]) == pytest.approx([-9, -5.4, -4.5, 0])
+    assert mesh.enclosed_volume() == pytest.approx(9 * np.pi)
+    closed = fx.mesh.tube(radius=2.0, length=9.0, elements=(np.linspace(0, 1, 13), 4), part="quarter", end="closed")
+    like = fx.mesh.tube(radius=2.0, length=9.0, elements=(12, 4), part="quarter", end="closed")
+    assert np.array_equal(closed.whole()[0], like.whole()[0])
+
+
 def test_arc_length_of_a_meridian_gives_a_thickness():
     mesh = fx.mesh.revolved([(10, 0), (10, -20), (4, -28), (0, -28)], elements=(17, 6), part="quarter")
     assert mesh.arc_length([10.0, 10.0, 4.0], [0, 0, 0], [-7, -20, -28]) == pytest.approx([7, 20, 30], abs=0.05)
@@ -174,6 +185,10 @@ CONE = [(4, 1, 0), (4, 2, 1), (4, 3, 2), (4, 0, 3)]
     (lambda: fx.mesh.tube(radius=-1.0, length=4.0, elements=(4, 8)), "tube: radius = -1.0"),
     (lambda: fx.mesh.tube(radius=1.0, length=0.5, elements=(4, 8), end="closed"), "at least the radius"),
     (lambda: fx.mesh.tube(radius=1.0, length=4.0, elements=(4, 2)), "at least 3 for the whole"),
+    (lambda: fx.mesh.tube(radius=1.0, length=4.0, elements=(4, [0, 50, 40, 90]), part="quarter"), "increases from 0"),
+    (lambda: fx.mesh.tube(radius=1.0, length=4.0, elements=(4, [0, 100, 200])), "increases from 0 to 360"),
+    (lambda: fx.mesh.tube(radius=1.0, length=4.0, elements=(4, [0, 150, 250, 360])), "150 degrees wide"),
+    (lambda: fx.mesh.tube(radius=1.0, length=4.0, elements=(4,), end="closed"), "along the meridian, and round"),
     (lambda: fx.mesh.revolved([(1, 0), (0, -1), (1, -2)], elements=(None, 8)), "only the last point may lie on"),
     (lambda: fx.mesh.surface(P, [*CONE[:3], (4, 3, 0)]), "look to different sides of the surface at"),
     (lambda: fx.mesh.surface(P, [*CONE[:3], (4, 0, 9)]), "three numbers of points each, from 0 to 4"),

@@ -9,21 +9,21 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...errors import InputError, as_points, check_name, count, file_path, pair, positive
+from ...errors import InputError, as_list, as_points, check_name, count, file_path, finite_array, positive
 from ...mesh.edges import edges_of
 from ...mesh.grid import Grid
 from ...mesh.nodes import SAME_PLACE
 from .stl_reader import read_stl
 from .surface_mesh import SurfaceMesh, surface_mesh
 
-_SWEEP = {"whole": (0.0, 2 * np.pi), "half": (-np.pi / 2, np.pi), "quarter": (0.0, np.pi / 2)}
-"""First angle and sweep of each part, radians."""
+_ANGLES = {"whole": (0.0, 360.0), "half": (-90.0, 90.0), "quarter": (0.0, 90.0)}
+"""First and last angle of each part, degrees."""
 
 FACES = ("inner", "outer")
 """Faces of a curved surface, first the one opposite to the normals of its triangles."""
 
 
-def tube(*, radius: float, length: float, elements: tuple[int, int], part: str = "whole", end: str = "open",
+def tube(*, radius: float, length: float, elements: tuple[Any, Any], part: str = "whole", end: str = "open",
          z: float = 0.0, layers: Sequence[str] = ("sheet",), comm: MPI.Comm = MPI.COMM_WORLD) -> SurfaceMesh:
     """Mesh the middle surface of a tube about the z axis, which hangs down from its neck.
 
@@ -32,7 +32,8 @@ def tube(*, radius: float, length: float, elements: tuple[int, int], part: str =
     Args:
         radius: radius of the middle surface, length.
         length: length of the tube along z, with a closed end included, length.
-        elements: number of rows of triangles along the meridian, and of columns round the modelled part.
+        elements: number of rows of triangles along the meridian, and of columns round the modelled part; or lists of
+            their places (`revolved`).
         part: modelled part: "whole"; "half" with x > 0; "quarter" with x > 0 and y > 0.
         end: "open", or "closed" by a hemisphere.
         z: coordinate z of the neck, length.
@@ -52,21 +53,21 @@ def tube(*, radius: float, length: float, elements: tuple[int, int], part: str =
     boundaries: neck, x0, y0, inner, outer
     """
     R, L = positive("tube: radius", radius), positive("tube: length", length)
-    along, _ = _numbers("tube", elements)
     check_name("tube: end", end, ("open", "closed"))
     if end == "open":
         return revolved([(R, z), (R, z - L)], elements=elements, part=part, layers=layers, comm=comm)
     if L < R:
         raise InputError(f"tube: length = {length!r}: must be at least the radius {R:g} of its closed end")
-    s = np.linspace(0.0, L - R + np.pi / 2 * R, along + 1)
+    rows, columns = _both("tube: elements", elements)
+    s = (L - R + np.pi / 2 * R) * _divisions("tube: elements: along", rows, (0.0, 1.0))
     angle = np.maximum(s - (L - R), 0.0) / R
     line = np.column_stack([R * np.cos(angle), z - np.minimum(s, L - R) - R * np.sin(angle)])
     line[-1, 0] = 0.0
     meridian = [(float(r), float(h)) for r, h in line]
-    return revolved(meridian, elements=(None, elements[1]), part=part, layers=layers, comm=comm)
+    return revolved(meridian, elements=(None, columns), part=part, layers=layers, comm=comm)
 
 
-def revolved(meridian: Sequence[tuple[float, float]], *, elements: tuple[int | None, int], part: str = "whole",
+def revolved(meridian: Sequence[tuple[float, float]], *, elements: tuple[Any, Any], part: str = "whole",
              layers: Sequence[str] = ("sheet",), comm: MPI.Comm = MPI.COMM_WORLD) -> SurfaceMesh:
     r"""Mesh a surface of revolution about the z axis, such as the middle surface of a preform or a closed parison.
 
@@ -74,14 +75,16 @@ def revolved(meridian: Sequence[tuple[float, float]], *, elements: tuple[int | N
 
     .. math:: r \sqrt{\frac{2 a}{\sin 2 a}}
 
-    with half the angle a between two columns. With nodes on the circle, the limit pressure of a tube would be too large
-    by a^2/2; so it is by a^2/6.
+    with the angle 2 a between two columns. With nodes on the circle the limit pressure of a tube would be too large by
+    a^2/2. It is too large by a^2/6.
 
     Args:
         meridian: points (r, z) of the middle surface from the neck on, length. The last point may lie on the axis, then
             the surface is closed there.
         elements: number of rows of triangles along the meridian, at equal arc lengths, and of columns round the
-            modelled part. None for the rows: one between two successive points of the meridian.
+            modelled part. None for the rows: one between two successive points of the meridian. Small triangles where
+            the mould has edges need lists: the ends of the rows as shares of the arc length, from 0 to 1, and the ends
+            of the columns as angles in degrees, from 0 to 90 for a quarter, from -90 to 90 for a half.
         part: modelled part: "whole"; "half" with x > 0; "quarter" with x > 0 and y > 0.
         layers: names of the layers; `Scene(thickness=...)` gives their thickness.
         comm: MPI communicator.
@@ -97,19 +100,21 @@ def revolved(meridian: Sequence[tuple[float, float]], *, elements: tuple[int | N
     >>> list(preform.boundaries), round(preform.enclosed_volume())
     (['neck', 'inner', 'outer'], 27079)
     """
-    along, round_ = _numbers("revolved", elements)
-    check_name("revolved: part", part, tuple(_SWEEP))
+    check_name("revolved: part", part, tuple(_ANGLES))
+    rows, columns = _both("revolved: elements", elements)
+    angles = _divisions("revolved: elements: round", columns, _ANGLES[part])
     line = as_points("revolved: meridian", meridian, 2).astype(float)
     if len(line) < 2 or np.any(np.linalg.norm(np.diff(line, axis=0), axis=1) == 0):
         raise InputError("revolved: meridian: must be at least two points (r, z), and each another")
-    if along is not None:
+    if rows is not None:
         s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-        line = np.column_stack([np.interp(np.linspace(0.0, s[-1], along + 1), s, column) for column in line.T])
+        at = s[-1] * _divisions("revolved: elements: along", rows, (0.0, 1.0))
+        line = np.column_stack([np.interp(at, s, column) for column in line.T])
     if line[:-1, 0].min() <= 0 or line[-1, 0] < 0:
         raise InputError(f"revolved: meridian: the radius {line[:, 0].min():g} is not allowed: only the last point may"
                          f" lie on the axis, and none beyond it")
     # the triangles look away from the axis and the inside if the meridian leads down
-    return surface_mesh(lambda: _grid(line, round_, part), comm, "revolved", FACES, layers, meridian=line)
+    return surface_mesh(lambda: _grid(line, np.radians(angles), part), comm, "revolved", FACES, layers, meridian=line)
 
 
 def surface(points: Any, triangles: Any, boundaries: Mapping[str, Any] | None = None, *,
@@ -179,27 +184,41 @@ def open_edges(points: np.ndarray, triangles: np.ndarray) -> dict[str, np.ndarra
     return {**dict(zip(names if len(lines) > 1 else names[:1], lines)), **found}
 
 
-def _numbers(caller: str, elements: Any) -> tuple[Any, int]:
-    """Return the numbers of rows (or None) and of columns of triangles, checked."""
-    along, round_ = pair(f"{caller}: elements", elements) if None not in tuple(elements) else elements
-    return (None if along is None else count(f"{caller}: elements: along", int(along)),
-            count(f"{caller}: elements: round", int(round_)))
+def _divisions(name: str, given: Any, ends: tuple[float, float]) -> np.ndarray:
+    """Return n + 1 increasing places between two ends, from their number n or from a list of them, shape (n + 1,)."""
+    if not isinstance(given, list | tuple | np.ndarray):
+        return np.linspace(*ends, count(name, given) + 1)
+    found = finite_array(name, given)
+    if found.ndim != 1 or len(found) < 2 or np.any(np.diff(found) <= 0) or not np.allclose(found[[0, -1]], ends):
+        raise InputError(f"{name} = {given!r}: must be a number, or a list that increases from {ends[0]:g} to"
+                         f" {ends[1]:g}")
+    return np.concatenate([ends[:1], found[1:-1], ends[1:]])
 
 
-def _grid(line: np.ndarray, columns: int, part: str) -> Grid:
+def _both(name: str, elements: Any) -> list[Any]:
+    """Return the divisions along the meridian and round the axis; raise `InputError` unless they are two."""
+    found = as_list(name, elements, "two numbers, or of lists of places")
+    if len(found) != 2:
+        raise InputError(f"{name} = {elements!r}: must be two numbers, or lists of places: along the meridian, and"
+                         f" round the axis")
+    return found
+
+
+def _grid(line: np.ndarray, angles: np.ndarray, part: str) -> Grid:
     """Return a surface of revolution from a meridian (r, z), neck first, shape (n, 2), length.
 
-    Triangles are counter-clockwise from outside, in `columns` round the part "whole", "half" or "quarter". Each ring of
-    chords encloses the area of its circle.
+    Triangles are counter-clockwise from outside, in columns between the angles round the part "whole", "half" or
+    "quarter", shape (columns + 1,), radians. Each ring of chords encloses the area of its circle.
     """
-    start, sweep = _SWEEP[part]
-    closed, whole = line[-1, 0] == 0, part == "whole"
+    columns, closed, whole = len(angles) - 1, line[-1, 0] == 0, part == "whole"
     rings, n = line[:-1] if closed else line, columns if whole else columns + 1
     if whole and columns < 3:
         raise InputError(f"revolved: elements: round = {columns}: must be at least 3 for the whole")
-    angle = start + sweep * np.arange(n) / columns
-    larger = np.sqrt(sweep / columns / np.sin(sweep / columns))
-    cos, sin = larger * np.round(np.cos(angle), 15), larger * np.round(np.sin(angle), 15)
+    if np.diff(angles).max() > np.pi / 1.5 + 1e-9:
+        raise InputError(f"revolved: elements: round: a column is {np.degrees(np.diff(angles).max()):.4g} degrees wide:"
+                         f" must be at most 120")
+    larger = np.sqrt((angles[-1] - angles[0]) / np.sin(np.diff(angles)).sum())
+    cos, sin = (larger * np.round(f(angles[:n]), 15) for f in (np.cos, np.sin))
     points = np.concatenate([np.column_stack([r * cos, r * sin, np.full(n, z)]) for r, z in rings]
                             + [np.array([[0.0, 0.0, line[-1, 1]]])] * int(closed))
     row = np.arange(len(rings) * n).reshape(len(rings), n)

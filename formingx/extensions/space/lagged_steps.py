@@ -119,10 +119,9 @@ class LaggedApproach(Approach):
         return bool(combined(self._comm, found, MPI.LOR))
 
     @cached_property
-    def _passed_tool(self) -> PassedTool | None:
-        """Test for parts of the tool on the wrong side of the sheet; None for a sheet that is not flat at first."""
-        rule: Any = self.face.rule
-        return PassedTool(self.face) if rule.surface.scene.mesh.flat else None
+    def _passed_tool(self) -> PassedTool:
+        """Test for parts of the tool on the wrong side of the sheet."""
+        return PassedTool(self.face)
 
     def passed(self, fields: np.ndarray, control: float) -> PassedPoint | None:
         """Return the point of the tool that passed the sheet farthest; None if less than is resolved.
@@ -130,8 +129,7 @@ class LaggedApproach(Approach):
         fields: owned unknowns, shape (n,).
         """
         if self._last is None or self._last[1] != control or not np.array_equal(self._last[0], fields):
-            test = self._passed_tool
-            found = test.deepest(fields, control, LAGGED.max_passed_ratio) if test else None
+            found = self._passed_tool.deepest(fields, control, LAGGED.max_passed_ratio)
             self._last = fields.copy(), control, found
         found = self._last[2]
         return found if found is not None and found.ratio > LAGGED.max_passed_ratio else None

@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..._jit import address, address_of_integers
-from ...mesh.edges import edges_of
-from ...mesh.nodes import SAME_PLACE, nearest, own_cells
+from ...mesh.nodes import nearest, own_cells
 from ...ranks import gathered
 from .compiled_crossings import compiled
+from .surface_sides import SurfaceSides
 
 _SPACING = 0.35            # of the points on a tool, over the median edge of the triangles of the sheet
 _MOST_POINTS = 20_000      # on the surface of one tool
@@ -44,8 +44,7 @@ class PassedPoint(NamedTuple):
 class PassedTool:
     """Test of one contact for parts of its tool on the wrong side of the sheet.
 
-    The sheet was flat, in the plane z = 0. Where it is held, the plane continues it. A point of the tool is below this
-    surface if a ray along z crosses it once more upwards than downwards above the point.
+    `SurfaceSides` says on which side of the sheet a point of the tool is.
 
     Args:
         face: the `FaceContact`.
@@ -64,17 +63,21 @@ class PassedTool:
         place[nodes] = [node_of[int(dof)] for dof in face.rule.dofs[:, 0]]
         self._order = gathered(face.comm, index.local_to_global(place[nodes].astype(np.int32)))
         self._cells = gathered(face.comm, cells)
-        X = self._placed(face.points)
-        corners = X[self._cells]
+        X, scene = self._placed(face.points), surface.scene
+        corners, flat = X[self._cells], scene.mesh.flat
         turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] < 0
-        self._cells[turned] = self._cells[turned][:, ::-1]
+        self._cells[turned & flat] = self._cells[turned & flat][:, ::-1]
         edges = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2)
         self._size = float(np.median(edges))
+        self._sides = SurfaceSides(self._cells, X, flat, scene.symmetry.planes, self._size)
+        self._faces_out = face.contact.on in ("top", "outer")
         way = face.contact.travel_vector
-        margin = (1.0 if way[0] or way[1] else _MARGIN) * np.ptp(X, axis=0).max()
-        self._points = surface_points(face.contact.tool, _SPACING * self._size, X, margin)
-        self._points += self._size * _OFFSET                  # off the edges of triangles, which a ray must not hit
-        self._edge = _outer_nodes(self._cells, X, surface.scene.symmetry.planes)
+        margin = (1.0 if way[0] or way[1] or not flat else _MARGIN) * np.ptp(X, axis=0).max()
+        points = surface_points(face.contact.tool, _SPACING * self._size, X, margin)
+        for plane in scene.symmetry.planes:
+            if way[plane.axis] == 0:                          # the mirror image of the sheet is on the other side
+                points = points[(points[:, plane.axis] >= plane.position) == plane.above]
+        self._points = points + self._size * _OFFSET @ self._sides.axes           # off the edges, which no ray must hit
 
     def deepest(self, fields: np.ndarray, control: float, negligible: float) -> PassedPoint | None:
         """Return the point of the tool that passed the sheet farthest, or None; collective.
@@ -82,26 +85,16 @@ class PassedTool:
         fields: owned unknowns, shape (n,). negligible: distance from the nearest node, over the median edge, up to
         which a point is not examined.
         """
-        face, x = self._face, self._points
+        face, x, sides = self._face, self._points, self._sides
         P = self._placed(face.positions(fields, control))
-        low, high = P[:, :2].min(0), P[:, :2].max(0)
-        x = x[((x[:, :2] >= low) & (x[:, :2] <= high)).all(1)]
+        x = x[sides.within(x, P)] if sides.known else x[:0]
         if not len(x):
             return None
-        n = np.maximum(np.ceil((high - low) / self._size), 1).astype(int)
-        cell = np.minimum(((x[:, :2] - low) / self._size).astype(int), n - 1) @ [n[1], 1]
-        first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=n[0] * n[1]))])
-        above, total, number = (np.zeros(len(x), dtype=int) for _ in range(3))
-        triangles = address_of_integers(self._cells)
-        compiled().crossings(
-            len(x), address(x), len(self._cells), address(P), triangles, address_of_integers(first),
-            address_of_integers(np.argsort(cell, kind="stable")), low[0], low[1], self._size, n[0], n[1],
-            address_of_integers(above), address_of_integers(total), address_of_integers(number))
         shift = face.tool_displacement(control)
-        below = above + ((total == 0) & (x[:, 2] + shift[2] < 0)) > 0
-        wrong = np.flatnonzero((number > 0) & (below == (face.contact.on == "top")))
-        if len(wrong):                                        # at its edge, the sheet is not continued by the plane
-            wrong = wrong[nearest(P[self._edge], x[wrong])[0] > self._size]
+        outside, met = sides.outside(x, P, shift[2])
+        wrong = np.flatnonzero(met & (outside != self._faces_out))
+        if len(wrong) and len(sides.edge):                    # at its edge, the sheet is not continued
+            wrong = wrong[nearest(P[sides.edge], x[wrong])[0] > self._size]
         if len(wrong):
             wrong = wrong[nearest(P, x[wrong])[0] > negligible * self._size]
         if not len(wrong):
@@ -109,8 +102,8 @@ class PassedTool:
         wrong = wrong[:: max(len(wrong) // _MOST_COMPARED, 1)]
         depth, longest = np.zeros(len(wrong)), np.zeros(len(wrong))
         x = np.ascontiguousarray(x[wrong])
-        compiled().distances(len(x), address(x), len(self._cells), address(P), triangles, address(depth),
-                             address(longest))
+        compiled().distances(len(x), address(x), len(self._cells), address(P), address_of_integers(self._cells),
+                             address(depth), address(longest))
         k = int(np.argmax(depth / longest))
         return PassedPoint(float(depth[k] / longest[k]), float(depth[k]), x[k] + shift)
 
@@ -119,19 +112,6 @@ class PassedTool:
         found = np.empty((len(self._order), 3))
         found[self._order] = gathered(self._face.comm, positions)
         return found
-
-
-def _outer_nodes(cells: np.ndarray, X: np.ndarray, planes: tuple[Any, ...]) -> np.ndarray:
-    """Return the nodes at the edge of a sheet, without its cuts at planes of symmetry, shape (k,).
-
-    cells: shape (m, 3). X: reference positions, shape (n, 3), length.
-    """
-    _, edges, _, times = edges_of(cells)
-    outer = edges[times == 1]
-    for plane in planes:
-        off = np.abs(X[outer, plane.axis] - plane.position).max(1)
-        outer = outer[off > SAME_PLACE * np.ptp(X, axis=0).max()]
-    return np.unique(outer)
 
 
 def surface_points(tool: Any, spacing: float, nodes: np.ndarray, margin: float) -> np.ndarray:

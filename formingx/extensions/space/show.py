@@ -27,6 +27,9 @@ from .wall import wall_of
 _DRAWN, _FRAMES = 200_000, (10, 100)
 """Largest number of nodes of all drawn states of a report together; smallest and largest number of drawn states."""
 
+_DRAWN_AREA = 0.99
+"""Share of the area whose wall is within the range of colours; a pinch is thicker."""
+
 _LARGEST_TOOL = _DRAWN // _FRAMES[0]
 """Largest number of triangles of a tool that a report draws, as many as nodes of the body."""
 
@@ -48,12 +51,14 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
         size = np.ptp(wall.deformed_points, axis=0).max()
         lift = 0.004 * size * camera / np.linalg.norm(camera)           # else lines flicker
         values = wall.ratio                                 # of each triangle: means at nodes hide the thinnest
+        order = np.argsort(values)
+        largest = values[order][np.searchsorted(np.cumsum(wall.area[order]), _DRAWN_AREA * wall.area.sum())]
         faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
         with plotted(file) as plotter:
             for scale, shift in images:
                 surface = pyvista.PolyData(wall.deformed_points * scale + shift, faces)
                 surface.cell_data["ratio"] = values
-                plotter.add_mesh(surface, **shading(values), specular=0.2, split_sharp_edges=False)
+                plotter.add_mesh(surface, **shading(np.minimum(values, largest)), specular=0.2, split_sharp_edges=False)
                 for line in lines:
                     plotter.add_mesh(pyvista.lines_from_points(line * scale + shift + lift), color="black",
                                      line_width=1.5)
