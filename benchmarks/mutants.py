@@ -189,7 +189,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("forms/solid.py", "        return F * before", "        return before * F", "state_transfer remesh"),
     ("extensions/space/surface.py", "ufl.inner(f1, f2) / l1, 0]", "0.9 * ufl.inner(f1, f2) / l1, 0]", "space"),
     ("extensions/space/surface.py", "l2 = 1 / ufl.sqrt(l1)", "l2 = 1 / l1", "space"),
-    ("extensions/space/pressure_on_tools.py", "- ufl.inner(area, n) * ufl.inner(n, v)", "", "friction_in_space"),
+    ("extensions/space/pressure_on_tools.py", "- side * size * n", "", "friction_in_space"),
     ("extensions/space/pressure_on_tools.py", "h * (u - a) for h, u, a", "0 * h * (u - a) for h, u, a",
      "friction_in_space"),
     ("extensions/space/lagged_friction.py", "dg = np.eye(3) - outer(n, n) - bends", "dg = np.eye(3) - outer(n, n)",

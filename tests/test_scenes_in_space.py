@@ -5,6 +5,7 @@ import pytest
 from test_solid_surfaces import ball
 
 import formingx as fx
+from formingx.extensions.space.surface import Surface
 from formingx.extensions.space.triangulated import Triangulated
 from formingx.io.stl import write_stl
 
@@ -115,13 +116,45 @@ def test_the_thinnest_triangle_is_drawn(monkeypatch, tmp_path):
     assert options["clim"][0] == pytest.approx(path.part().min_wall / 0.5, rel=1e-9)
 
 
-@pytest.mark.parametrize("friction, told", [("none", True), ("stick", False)])
-def test_forces_that_miss_the_pressure_are_told(friction, told):
-    """Reactions of a cup on coarse triangles without friction are a tenth too small; those under stick are exact."""
-    cup = fx.tools.revolved(fx.Tool([(1.5, 0.0), (1.0, 0.0), (1.0, -0.8), (0.0, -0.8)], [0.0, 0.0, 0.12, 0.0]))
-    sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=0.1)
+def cup(friction, size, fillet=0.12, depth=0.8):
+    """Return the path of a disc that a pressure of 0.36 forms in a cup."""
+    profile = fx.Tool([(1.5, 0.0), (1.0, 0.0), (1.0, -depth), (0.0, -depth)], [0.0, 0.0, fillet, 0.0])
+    sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=size)
     scene = fx.Scene(mesh=sheet, thickness=0.01, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("top")],
                      supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")],
-                     contacts=[fx.Contact("bottom", cup, friction)])
-    found = fx.trace(scene, until=fx.pressure(0.36), progress=False).findings()
-    assert any("miss the resultant of the pressure by" in finding.text for finding in found) == told
+                     contacts=[fx.Contact("bottom", fx.tools.revolved(profile), friction, name="mould")])
+    return fx.trace(scene, until=fx.pressure(0.36), progress=False)
+
+
+def rim_force(path):
+    """Return the force of the rim on the whole sheet along z, from the balance of its nodes."""
+    with path.problem.state_context(path.last) as problem:
+        forces, (face,) = problem.forces(problem.x, path.last.control), problem.contacts
+        rim = np.hypot(*face.points[:, :2].T) > 1 - 1e-9
+        return 4 * forces[face.rule.dofs[rim, 2]].sum() * problem.forms.stress * problem.forms.volume
+
+
+@pytest.mark.parametrize("friction, size, fillet, depth", [
+    ("none", 0.15, 0.12, 0.8), ("stick", 0.15, 0.12, 0.8),
+    *(pytest.param(*case, marks=pytest.mark.thorough) for case in (("none", 0.08, 0.15, 0.6), (0.3, 0.1, 0.12, 0.8)))])
+def test_supports_and_tools_balance_the_pressure(friction, size, fillet, depth):
+    """They do on any triangles, up to the friction of the last step."""
+    path = cup(friction, size, fillet, depth)
+    points, cells = path.problem.forms.domain.geometry.x, path.problem.forms.domain.geometry.dofmap
+    a, b, c = points[cells].transpose(1, 0, 2)
+    load = 4 * 0.36 * np.abs(np.cross(b - a, c - a)[:, 2]).sum() / 2
+    assert rim_force(path) - path.last.measures["mould_force"] == pytest.approx(load, rel=1e-7)
+    assert not any("miss the resultant" in finding.text for finding in path.findings())
+
+
+@pytest.mark.thorough
+def test_the_force_of_a_sliding_sheet_converges():
+    """On triangles nearly as long as the radius of the fillet, the force on the mould is within 1 %."""
+    coarse, fine = (cup("none", size).last.measures["mould_force"] for size in (0.1, 0.04))
+    assert coarse == pytest.approx(fine, rel=0.01)
+
+
+def test_forces_that_miss_the_loads_are_told(monkeypatch):
+    monkeypatch.setattr(Surface, "carried_forces", lambda self, face, fields, control: 0.0)
+    found = cup("none", 0.15).findings()
+    assert any("miss the resultant of the loads by 8" in finding.text for finding in found)

@@ -416,7 +416,7 @@ def test_states_at_targets_of_a_sliding_sheet_depend_on_no_steps(value):
 def test_a_target_whose_second_solution_fails_keeps_the_first(monkeypatch):
     """If Newton's method fails with the renewed contact pressure, the state at the target is the one before."""
     def run():
-        path = fx.trace(trough(0.1, friction="none"), until=fx.pressure(0.3), progress=False)
+        path = fx.trace(trough(0.1, friction="none"), until=fx.pressure(0.4), progress=False)
         return path.wall().ratio
     renewed, renew, solve, fails = run(), LaggedCorrections.renew, Curve.solve_again, []
 
@@ -486,11 +486,11 @@ def on_ball(friction):
 
 
 def test_tray_without_friction():
-    """The tray is filled in less than 500 iterations, and walls do not depend on the number of nodes per step."""
+    """The tray is filled in less than 250 iterations, and walls do not depend on the number of nodes per step."""
     walls = []
     for nodes in (2, 6):
         path = fx.trace(tray("none", nodes_per_step=nodes), until=fx.pressure(1.2), progress=False)
-        assert path.counts.failures == 0 and path.counts.iterations < 500 and path.filling().touching[-1] > 0.99
+        assert path.counts.failures < 3 and path.counts.iterations < 250 and path.filling().touching[-1] > 0.99
         walls.append(path.wall().ratio)
     np.testing.assert_allclose(walls[1], walls[0], rtol=1e-7)
 

@@ -305,6 +305,15 @@ class FaceContact:
         """Add dimensionless forces at the points, shape (n, c), to locally owned entries `values` of the residual."""
         self.rule.add(values, forces)
 
+    def forces(self, fields: np.ndarray, control: float) -> np.ndarray:
+        """Return the forces on the tool near the points, shape (n, components), stress length^2; collective.
+
+        They are contact forces at the points, and in three dimensions pressure that acts on the tool between them.
+        fields: owned unknowns.
+        """
+        between = self._solid.carried_forces(self, fields, control)
+        return self.area[:, None] * self.tractions(fields, control).force + between
+
     def apply(self, forces: np.ndarray | None) -> None:
         """Set dimensionless forces, shape (n, c), that act in the residual in place of the law, except where NaN."""
         self._applied = forces

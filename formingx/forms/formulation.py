@@ -229,6 +229,10 @@ class Formulation(ABC):
         for past in self._pasts:
             past.refresh()
 
+    def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray | float:
+        """Return the forces of pressures that act on a tool between the points of a contact face; 0."""
+        return 0.0
+
     def dissipated(self, factor: Any) -> Any:
         """Return the integral of `factor` times the dissipated power per volume (UFL, rank 0)."""
         return sum(self.weighted(factor * terms.dissipation(self.elastic_F), terms.names)

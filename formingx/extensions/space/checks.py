@@ -4,9 +4,9 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from dolfinx import la
 
 from ... import _compat
+from ...contact import resultants
 from ...findings import Finding, percent, register
 from ...mesh.nodes import nearest
 from ...physics.supports import Symmetry
@@ -16,7 +16,7 @@ from ...values.tolerances import NEGLIGIBLE
 from .solid_tool import Swept
 from .surface import smaller_stress
 
-_LOST_PRESSURE = 0.02      # share of the resultant of the pressure that supports and tools may miss
+_UNBALANCED = 0.02         # share of the resultant of the loads that supports and tools may miss
 
 _LARGE_WALL_ERROR = 0.2
 """Estimated error of the minimum wall over this wall above which a run warns of it."""
@@ -57,34 +57,35 @@ def error_of_minimum_wall(path: Any) -> Iterator[Finding]:
 
 
 @register("end")
-def lost_pressure(path: Any) -> Iterator[Finding]:
-    """Yield a finding if 2 % or more of the resultant of a pressure on a sliding sheet is left out; collective.
+def unbalanced_loads(path: Any) -> Iterator[Finding]:
+    """Yield a finding if supports and tools miss the resultant of the loads by 2 % or more; collective.
 
-    The tangential part of the pressure on nodes that slide is left out (`pressure_on_tools`). On coarse fillets this
-    part has a resultant, which supports and tools then do not balance.
+    The internal forces of a sheet have no resultant, so the reactions balance the loads unless one of them is wrong.
     """
     problem = path.problem
-    works = getattr(problem.forms, "pressure_works", None)
-    if not works:
+    if path.scene.kinematics.components != 3 or not problem.contacts or not problem.scene.loads:
         return
-    forms, resultants = problem.forms, []
+    forms = problem.forms
+    if forms.elastic_supports:
+        return
     vectors, numbers = forms.space.sub(0).collapse()
-    own = np.asarray(numbers).reshape(-1, 3)[:vectors.dofmap.index_map.size_local]
+    nodes = np.asarray(numbers).reshape(-1, 3)[:vectors.dofmap.index_map.size_local]
     with problem.state_context(path.last):
-        forms.refresh()
-        for works_of_one_kind in zip(*works):
-            form = forms.compile(sum(works_of_one_kind))
-            vector = la.vector(forms.space.dofmap.index_map, forms.space.dofmap.index_map_bs)
-            values = _compat.assemble_vector(vector, form)
-            resultants.append(combined(problem.comm, values[own].sum(0)))
-    lost, whole = resultants
-    planes = [plane.axis for plane in path.scene.symmetry.planes]
-    lost[planes] = whole[planes] = 0.0                        # balanced by the mirror image
-    share = float(np.linalg.norm(lost)) / max(float(np.linalg.norm(whole)), 1e-300)
-    if share > _LOST_PRESSURE:
-        yield Finding("warning", "pressure", f"the forces on supports and tools miss the resultant of the pressure by"
-                      f" {percent(share)}: where the sheet slides, its triangles are too coarse for the fillets of the"
-                      f" tools. Use smaller triangles there, or adapt_mesh=True, before you use a force.")
+        control, scale = path.last.control, forms.stress * forms.volume / forms.length
+        held = np.zeros(len(problem.forces(problem.x, control)))
+        held[problem.constrained] = problem.forces(problem.x, control)[problem.constrained]
+        works = sum(problem.assemble(forms.compile(work)) for work in forms.load_works)
+        loads, supports = (combined(problem.comm, values[nodes].sum(0)) for values in (works / forms.length,
+                                                                                       scale * held))
+        tools = sum(resultants.force(face, problem.x.array_r[:problem.n_owned], control)
+                    for face in problem.active_contacts)
+    missed, planes = tools - supports - loads, [plane.axis for plane in path.scene.symmetry.planes]
+    missed[planes] = loads[planes] = 0.0                      # balanced by the mirror image
+    share = float(np.linalg.norm(missed)) / max(float(np.linalg.norm(loads)), 1e-300)
+    if share > _UNBALANCED:
+        yield Finding("warning", "forces", f"the forces on supports and tools miss the resultant of the loads by"
+                      f" {percent(share)} in the last state: do not use a force. Use smaller triangles where the sheet"
+                      f" slides on fillets, or adapt_mesh=True.")
 
 
 @register("start")

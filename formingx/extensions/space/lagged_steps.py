@@ -228,8 +228,8 @@ class LaggedApproach(Approach):
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:
         """Replace the stored contact pressure by that of a state at a target, owned unknowns, shape (n,).
 
-        On tools in three dimensions it bounds friction in a step. Where a sheet slides, the tangential part of a fluid
-        pressure also decreases with it. False if both agree to `LaggedLimits.max_target_difference` in the
+        On tools in three dimensions it bounds friction in a step. Where a sheet slides, a fluid pressure also turns
+        into the normals of the tool with it. False if both agree to `LaggedLimits.max_target_difference` in the
         area-weighted 1-norm, or if no pressure is stored.
         """
         face, law, variables = self.face, self.face.law, self.face.get()

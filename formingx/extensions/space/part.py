@@ -200,7 +200,7 @@ def filling(path: Any, contact: Any) -> SheetFilling:
             x = contact.positions(fields, state.control)
             d = tool.signed_distance(x)
             closed = contact.touching(fields, state.control) | (d > -0.1 * contact.thickness)
-            forces = contact.area[:, None] * contact.tractions(fields, state.control).force
+            forces = contact.forces(fields, state.control)
         area = contact.rule.area
         nearest = tool.nearest_parts(x) if names else np.zeros(len(x), dtype=int)
         shares = [np.append(area[closed & (nearest == k)].sum(), forces[nearest == k].sum(0))

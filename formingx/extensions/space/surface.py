@@ -57,8 +57,6 @@ class Surface(Formulation):
 
     singular_unloaded = True
     _on_tools: PressureOnTools | None = None
-    pressure_works: list[tuple[Any, Any]] = []
-    """For each pressure on a sliding sheet the virtual work of its removed tangential part, and of all of it (UFL)."""
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
         """Return the normal of a face (UFL, shape (3,)) and the measure over the reference area, of degree 1."""
@@ -69,19 +67,24 @@ class Surface(Formulation):
         if self._on_tools is not None:
             self._on_tools.refresh()
 
+    def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray | float:
+        """Return the forces of pressures on a tool between the m contact points of a face, shape (m, 3).
+
+        They are 0 without a pressure on a sheet that slides. fields: owned unknowns, shape (n,). Unit: stress length^2.
+        """
+        return 0.0 if self._on_tools is None else self._on_tools.carried_forces(face, fields, control)
+
     def _residual(self, body: Any) -> tuple[Any, Any, Any]:
         residual, by_control, by_time = super()._residual(body)
         pressures = [(load, value) for load, value in self.load_values if isinstance(load, Pressure)]
         if not pressures or all(contact.sticks for contact in self.scene.contacts):
             return residual, by_control, by_time
         self._on_tools = PressureOnTools(self)
-        self.pressure_works = []
         for load, value in pressures:
             face = body.face(load.on, load.quadrature_degree)
             area = self.scene.kinematics.area_vector(self.u, self.X, face.normal)
             applied = load.share(self) * value
             work = self._on_tools.work(applied, area)
-            self.pressure_works.append((work, applied * ufl.inner(area, self.test_displacement()) * face.measure))
             residual -= self._scale * work
             if load.driven:
                 by_control -= self._scale * ufl.diff(work, self._control)
