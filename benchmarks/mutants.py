@@ -44,7 +44,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("contact/rule.py", "+= share * whole", "+= share * whole / 2", "details"),
     ("contact/face.py", "        if one_sided:\n            newly", "        if False:\n            newly",
      "contact plugs jumps"),
-    ("contact/face.py", "-self._scale[:, None] * (stiffness @", "self._scale[:, None] * (stiffness @",
+    ("contact/face.py", "-self.scale[:, None] * (stiffness @", "self.scale[:, None] * (stiffness @",
      "contact derivatives"),
     ("contact/step_limit.py", "> 2 * max(self.max_closures, self._predicted_closures) + 2", "> 10**6", "details"),
     ("contact/step_limit.py", "return arc_lengths, start + arc_lengths[:, None] * velocity",
@@ -81,7 +81,7 @@ MUTANTS = [Mutant(*row) for row in [
      "out.array_w += (control - 0.5) * stage.unbalanced", "process"),
     ("problem/problem.py", "self.history_variables, self._predicted = variables, predicted",
      "self._predicted = predicted", "details"),
-    ("forms/admissible.py", "> 0))\n                   for", "> -0.5))\n                   for", "admissible"),
+    ("forms/admissible.py", "> 0))\n                    for", "> -0.5))\n                    for", "admissible"),
     ("forms/constraints.py", "active * row for (_, row), active", "row for (_, row), active", "process"),
     # materials
     ("materials/hyperelastic.py", "return c10 * (I1 - 3) + c01 * (I2 - 3)", "return c01 * (I1 - 3) + c10 * (I2 - 3)",

@@ -34,7 +34,7 @@ def funnel():
 def inside_out(path, state):
     """Part of the elements with a point where J <= 0."""
     with path.problem.state_context(state) as problem:
-        bad, cells, _ = problem.inverted_elements()
+        bad, cells, _ = problem.admissible.inverted_elements()
     return bad / cells
 
 

@@ -25,7 +25,7 @@ class Face:
         law = Law(tools.Tool([(0.0, 0.0), (9.0, 0.0)]), np.full(1, np.inf), np.full(1, K), THETA, 1e-3)
         here = np.array([[4.0, -0.5 * THETA]])
         history = law.start(here - [[slip, 0.0]])
-        self.points, self.scale, self.rule = here, np.ones(1), self
+        self.points, self.scale, self.rule, self.law = here, np.ones(1), self, law
         self.increment = Increment(law, history, here)
         self.increment.tractions(here)
         self.increment.linearise(here)

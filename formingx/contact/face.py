@@ -80,7 +80,7 @@ class Increment:
         self._before: Motion | None = None if start is None else law.motion(start, history)   # in the last iteration
         self._guessed = guessed
         self._sense: np.ndarray | None = None               # of sliding in the last iteration
-        self._last: tuple[np.ndarray, Tractions] | None = None
+        self._last: Any = None                              # positions and tractions of the last call
         self._last_positions = b""                          # those of `_last`
 
     def tractions(self, x: np.ndarray) -> Tractions:
@@ -103,8 +103,8 @@ class Increment:
         if self._before is not None:
             expected = self._before.to(x)
             if self._guessed is not None:
-                expected = Motion(*(np.where(self._guessed if a.ndim == 1 else self._guessed[:, None], b, a)
-                                    for a, b in zip(expected, now)))
+                expected = Motion(*[np.where(self._guessed if a.ndim == 1 else self._guessed[:, None], b, a)
+                                    for a, b in zip(expected, now)])
             found = self._law.tractions(x, self._history, self._sense, expected)
             self._last = x, found
         self._sense, self._before, self._guessed = found.sense, now, None
@@ -113,28 +113,23 @@ class Increment:
     @property
     def status(self) -> np.ndarray:
         """`ContactStatus` of each point (open, sticking, sliding) in the last computed tractions, shape (n,)."""
-        return self._last_result[1].status
+        return self._last[1].status
 
     @property
     def newly_closed(self) -> np.ndarray:
         """Mask of the points that are in contact now and were open at the start of the increment, shape (n,)."""
         if self._touched is None:
-            return np.zeros(len(self._last_result[0]), dtype=bool)
-        return self._law.touching(self._last_result[0], self._history) & ~self._touched
-
-    @property
-    def ramp(self) -> float:
-        """Half-width theta of the ramp, the range of distances over which the contact pressure sets in, length."""
-        return self._law.theta
+            return np.zeros(len(self._last[0]), dtype=bool)
+        return self._law.touching(self._last[0], self._history) & ~self._touched
 
     def last_tractions(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the tractions, (m, c), stress, and stiffnesses, (m, c, c), that the last `linearise` used."""
-        return self._last_result[1].force[points], self._last_result[1].stiffness[points]
+        return self._last[1].force[points], self._last[1].stiffness[points]
 
     def predicted(self, motion: np.ndarray) -> Tractions:
         """Return the law linearised after a further motion y of all points, shape (n, c), length.
         Traction f and stiffness S are those before the motion: after it the traction is f + S y."""
-        x, predicted = self._last_result[0], self._predicted_motion(slice(None))
+        x, predicted = self._last[0], self._predicted_motion(slice(None))
         return self._law.tractions(x, self._history, None, predicted(motion))
 
     def law_at(self, points: np.ndarray) -> Callable[[np.ndarray], Tractions]:
@@ -142,8 +137,8 @@ class Increment:
 
         Its `Tractions` have the traction f and stiffness S before the motion; after it the traction is f + S y.
         """
-        history = self._history and ContactHistory(*(part[points] for part in self._history))
-        law, x, predicted = self._law.part(points), self._last_result[0][points], self._predicted_motion(points)
+        history = self._history and ContactHistory(*[part[points] for part in self._history])
+        law, x, predicted = self._law.part(points), self._last[0][points], self._predicted_motion(points)
         return lambda motion: law.tractions(x, history, None, predicted(motion))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
@@ -153,8 +148,8 @@ class Increment:
         c), length; 0 for points that slide, adhere or have no friction. Sticking points stop at the edge with it.
         """
         assert self._before is not None
-        width, x = 2 * self._law.theta, self._last_result[0][points]
-        before = Motion(*(part[points] for part in self._before))
+        width, x = 2 * self._law.theta, self._last[0][points]
+        before = self._before.part(points)
         law = self._law.part(points)
         sticks = np.reshape(law.has_friction and not law.adhesive and law.sticks, (-1, 1))
 
@@ -165,22 +160,17 @@ class Increment:
     def _predicted_motion(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
         """Return a function from the motion of m points, shape (m, c), length, to their predicted `Motion`."""
         assert self._before is not None
-        before, x = Motion(*(part[points] for part in self._before)), self._last_result[0][points]
+        before, x = self._before.part(points), self._last[0][points]
         return lambda motion: before.to(x + motion)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
         """Set the sense of sliding, 1, -1 or 0 (sticking), at masked points, shape (n,) both, for `linearise`."""
         self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
 
-    @property
-    def _last_result(self) -> tuple[np.ndarray, Tractions]:
-        """Positions and tractions of the last call of `tractions` or `linearise`."""
-        assert self._last is not None, "call `tractions` first"
-        return self._last
-
 
 _SAME_STIFFNESS = 1e-3
 """Relative difference of the stiffness of a point below which the stored tangent serves for the next step."""
+
 
 
 class FaceContact:
@@ -200,7 +190,12 @@ class FaceContact:
         law: contact law at the points.
         thickness: thickness of the body behind the face, length.
         increment: the current `Increment`.
+        history: history variables of the contact law; None if it has none, as without friction.
+        displacement: function of owned unknowns, see `Rule.displacement`.
+        add: function that adds dimensionless forces at the points to owned entries of the residual, see `Rule.add`.
+        scale: factor from tractions to the dimensionless forces in the residual F, shape (n,), 1/stress.
         active: True if the contact is active in the stage.
+        moves: True if the tool moves as the control changes, in the stage.
         shift: reduction of the signed distances from the tool after a remeshing, shape (n,), length; else None.
         unbalanced: sum of the residual at the points in contact, as a force, shape (components,), stress length^2. The
             resultant `force` is reduced by it, so that it balances the internal forces of the body. It is 0 except in
@@ -214,24 +209,26 @@ class FaceContact:
                            Lobatto(solid, contact.on, assemble) if contact.points == "nodes" else
                            Gauss(solid, contact.on, int(contact.points)))
         self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
+        self.displacement, self.add = self.rule.displacement, self.rule.add
         self._warm = solid.temperature.nodes(self.rule.nodes, contact.on) if contact.friction_by_temperature else None
         self._penalty = np.ones(len(self.points))
         self.unbalanced = np.zeros(self.points.shape[1])
         self.shift: np.ndarray | None = None
         self.law = self._law(1.0)
-        self._scale = solid.length / (solid.stress * solid.volume) * self.rule.area
+        self.scale = solid.length / (solid.stress * solid.volume) * self.rule.area
         self._travel_vector = solid.length * contact.travel_vector
         self.enter(0.0, float(contact.driven), True)
         self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the last tangent
         self._guessed: np.ndarray | None = None
         self._applied: np.ndarray | None = None             # forces in the residual in place of the law, see `apply`
         self._stored: FaceHistory | None = None
+        self.history: ContactHistory | None = None
         self.start()
 
     def enter(self, base: float, rate: float, active: bool) -> None:
         """Set the travel of the tool at control 0 and its derivative, over the length scale, and whether it is active.
         """
-        self._base, self._rate, self.active = base, rate, active
+        self._base, self._rate, self.active, self.moves = base, rate, active, bool(rate)
 
     def shift_distances(self, shift: np.ndarray) -> None:
         """Reduce the distances from the tool by `shift`, shape (n,), length.
@@ -249,11 +246,6 @@ class FaceContact:
             self.law = self.law.with_friction(self.contact.friction_at(self._temperatures(), clamped=True))
             self.increment = Increment(self.law, self.history)
 
-    def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the points, shape (n, components) or (n, components, k), in the unit of `values`.
-        values: locally owned unknowns, shape (m,) or (m, k). Collective."""
-        return self.rule.displacement(values)
-
     def positions(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the positions of the points relative to the tool, shape (n, components), length; fields: owned."""
         return self.points + self._length * self.displacement(fields) - self.tool_displacement(control)
@@ -261,11 +253,6 @@ class FaceContact:
     def tool_displacement(self, control: float) -> np.ndarray:
         """Return the displacement of the tool at a load parameter (control), shape (components,), length."""
         return (self._base + self._rate * control) * self._travel_vector
-
-    @property
-    def moves(self) -> bool:
-        """True if the tool moves as the control changes, in the current stage."""
-        return bool(self._rate)
 
     def relative_motion(self, dx: np.ndarray, step: np.ndarray | float) -> np.ndarray:
         """Return the motion relative to the tool by dx, shape (m,) or (m, k), and step.
@@ -292,18 +279,9 @@ class FaceContact:
         return np.where(self._stored.newly_closed, 0.0, self.rule.area)
 
     @property
-    def scale(self) -> np.ndarray:
-        """Factor from contact tractions to the dimensionless forces in the residual F, shape (n,), 1/stress."""
-        return self._scale
-
-    @property
     def stiffness_in_tangent(self) -> np.ndarray:
         """d(nodal force)/d(position) in the last tangent, shape (n, components, components), 1/length."""
-        return self._scale[:, None, None] * self._in_tangent
-
-    def add(self, values: np.ndarray, forces: np.ndarray) -> None:
-        """Add dimensionless forces at the points, shape (n, c), to locally owned entries `values` of the residual."""
-        self.rule.add(values, forces)
+        return self.scale[:, None, None] * self._in_tangent
 
     def forces(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the forces on the tool near the points, shape (n, components), stress length^2; collective.
@@ -331,12 +309,12 @@ class FaceContact:
 
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the contact forces in a state to the residual `values`; both with locally owned entries."""
-        force = self._scale[:, None] * self.tractions(fields, control).force
+        force = self.scale[:, None] * self.tractions(fields, control).force
         self.add(values, force if self._applied is None else np.where(np.isnan(self._applied), force, self._applied))
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Linearise the law at a state; its forces replace those of the law in `values`, shape (m,)."""
-        self.add(values, self._scale[:, None] * self.increment.linearise(self.positions(fields, control)))
+        self.add(values, self.scale[:, None] * self.increment.linearise(self.positions(fields, control)))
 
     def tangent(self, fields: np.ndarray, control: float, one_sided: bool = False) -> np.ndarray:
         """Return and store the derivative of the nodal forces by the m unknowns of each point, shape (n, m, m).
@@ -377,7 +355,7 @@ class FaceContact:
         """
         if self._rate:
             stiffness = self._stiffness(fields, control, one_sided)
-            self.add(values, -self._scale[:, None] * (stiffness @ (self._rate * self._travel_vector)))
+            self.add(values, -self.scale[:, None] * (stiffness @ (self._rate * self._travel_vector)))
 
     def _stiffness(self, fields: np.ndarray, control: float, one_sided: bool) -> np.ndarray:
         """Return d(traction)/d(position), shape (n, components, components), stress/length.
@@ -391,7 +369,7 @@ class FaceContact:
 
     def _of_unknowns(self, stiffness: np.ndarray) -> np.ndarray:
         """Return derivatives of nodal forces, shape (n, m, m), from those of tractions, stress/length."""
-        return self.rule.nodal_stiffness((self._scale * self._length)[:, None, None] * stiffness)
+        return self.rule.nodal_stiffness((self.scale * self._length)[:, None, None] * stiffness)
 
     @property
     def _reference_penalty(self) -> float:
@@ -415,11 +393,6 @@ class FaceContact:
     def has_history(self) -> bool:
         """True if the contact forces depend on history variables."""
         return self.law.has_history or self.contact.present_area
-
-    @property
-    def history(self) -> ContactHistory | None:
-        """History variables of the contact law; None if it has none, as without friction."""
-        return self._stored and self._stored.history
 
     def start(self) -> None:
         """Set the history variables of the reference configuration, in which the points have not been in contact."""
@@ -472,7 +445,7 @@ class FaceContact:
 
     def _set_history(self, variables: FaceHistory | None) -> None:
         """Set the history variables (None: there are none), and begin an increment that evaluates single states."""
-        self._stored = variables
+        self._stored, self.history = variables, variables and variables.history
         if self.contact.present_area and variables is not None:
             self._set_penalty(variables.penalty)
         self.increment = Increment(self.law, self.history)

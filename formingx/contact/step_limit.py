@@ -180,7 +180,7 @@ class Approach:
         face, theta = self.face, self.face.law.theta
         if face.history is None:
             return False
-        a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
+        a, b = [face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control))]
         found = int(np.sum((a <= -theta - LIMITS.negligible_gap * face.thickness) & (b > -theta)))
         return bool(combined(self._comm, found, MPI.SUM) > 2 * max(self.max_closures, self._predicted_closures) + 2)
 
@@ -355,7 +355,7 @@ class StepLimit:
     def only_sticks(self) -> bool:
         """True if active contact with friction all sticks, on profiles in a plane: no point begins to slide."""
         faces = [approach.face for approach in self.active_contacts if approach.face.law.has_friction]
-        return bool(faces) and all(face.contact.sticks and not face.contact.lagged for face in faces)
+        return bool(faces) and all([face.contact.sticks and not face.contact.lagged for face in faces])
 
     @property
     def predicts_events(self) -> bool:
@@ -407,7 +407,7 @@ class StepLimit:
     @property
     def settling(self) -> int:
         """Number of Newton iterations of a step of any length that the step control does not count."""
-        return max((c.settling for c in self.active_contacts), default=0)
+        return max([c.settling for c in self.active_contacts], default=0)
 
     @property
     def corrections(self) -> Any | None:

@@ -131,8 +131,8 @@ class Admissible:
         a bent element without harm, as under a plug. `minimum` finds such points.
         """
         found = self.quantities()
-        mine = all(bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
-                   for quantity, values in found.items())
+        mine = all([bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
+                    for quantity, values in found.items()])
         return all(listed(self._forms.comm, mine))
 
     def inverted_elements(self) -> tuple[int, int, tuple[float, float]]:
@@ -142,8 +142,8 @@ class Admissible:
         if J.size:
             k = np.unravel_index(np.argmin(J), J.shape)
             mine = float(J[k]), tuple(self._X[k].tolist())
-        counts = listed(self._forms.comm, (int((J <= 0).any(1).sum()), len(J), mine))
-        return sum(c[0] for c in counts), sum(c[1] for c in counts), min(c[2] for c in counts)[1]
+        bad, cells, smallest = zip(*listed(self._forms.comm, (int((J <= 0).any(1).sum()), len(J), mine)))
+        return sum(bad), sum(cells), min(smallest)[1]
 
     def quantities(self) -> dict[str, np.ndarray]:
         """Return {"in-plane determinant": values, "hoop stretch": values} in owned cells, shape (cells, points) each.

@@ -66,6 +66,7 @@ class Formulation(ABC):
             its amplitude (`StepData`). The last entry, 1, belongs to the time.
         control_scale: entry of `scales` for the only load, support or contact with a control; else L.
         terms: the `MaterialTerms` of each material of the scene.
+        refreshed: coefficients that depend on fields and time, with a method `refresh`: integrals over past states.
         histories: history variables of materials and temperature (`History`), on which the forms depend.
         potential: incremental potential of a step, divided by stress times volume (UFL, rank 0).
         energy: stored energy divided by stress times volume (UFL, rank 0), or None; without histories the potential.
@@ -140,9 +141,10 @@ class Formulation(ABC):
         self._terms = {name: terms for material, names in self._groups()
                        for terms in [MaterialTerms(self, material, names)] for name in names}
         self.terms = list(dict.fromkeys(self._terms.values()))
-        self._pasts = [terms.material.integral.history(self, terms) for terms in self.terms if terms.past_integrals]
+        pasts = [terms.material.integral.history(self, terms) for terms in self.terms if terms.past_integrals]
+        self.refreshed: list[Any] = list(pasts)
         changing = [terms for terms in self.terms if terms.internal]
-        self.histories: list[History] = [*self._pasts, *(MaterialHistory(self, terms) for terms in changing)]
+        self.histories: list[History] = [*pasts, *(MaterialHistory(self, terms) for terms in changing)]
         self.potential = self._energy(MaterialTerms.step_energy)
         self.energy = self.dissipation = None
         timed = [terms for terms in changing if terms.material.rate_dependent]
@@ -223,11 +225,6 @@ class Formulation(ABC):
             rate.value = active * setting.rate[i]
         for constant, value in zip(self._time, (setting.base[-1], setting.rate[-1])):
             constant.value = value
-
-    def refresh(self) -> None:
-        """Update the integrals over past states (K-BKZ materials) after a change of fields or time."""
-        for past in self._pasts:
-            past.refresh()
 
     def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray | float:
         """Return the forces of pressures that act on a tool between the points of a contact face; 0."""

@@ -9,15 +9,15 @@ import numpy as np
 
 
 class Start(Protocol):
-    """Interface of the state at the beginning of a step; the accepted states of a path have it.
+    """Interface of the state at the beginning of a step; the accepted states of a path have it."""
 
-    Attributes:
-        x: unknowns, locally owned entries, shape (n,).
-        control: load parameter (control), dimensionless.
-    """
+    @property
+    def x(self) -> np.ndarray:
+        """Unknowns, locally owned entries, shape (n,)."""
 
-    x: np.ndarray
-    control: float
+    @property
+    def control(self) -> float:
+        """Load parameter (control), dimensionless."""
 
 
 class History(Protocol):

@@ -128,7 +128,7 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
     x: unknowns on the mesh of `problem`, shape (n,). Those of contact are left out if the numbers of histories differ,
     or if `moved` is True: the mesh is one of the deformed body.
     """
-    problem.set_fields_and_control(x, control)
+    problem.set_fields(x, control)
     with source.state_context(state):
         def on_this_mesh(points: np.ndarray) -> np.ndarray:
             """Map reference points of the mesh of `source`, shape (n, 2), to the mesh of `problem`."""

@@ -46,7 +46,7 @@ class _Nodal(_Recorded):
 
     def value(self, x, control):
         active = [c for c in self._contacts if c in self._problem.active_contacts]
-        return float(self._reduce([0.0, *(self._quantity(contact, x.array_r, control) for contact in active)]))
+        return float(self._reduce([0.0, *[self._quantity(contact, x.array_r, control) for contact in active]]))
 
 
 class _Reaction(_Recorded):

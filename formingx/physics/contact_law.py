@@ -107,6 +107,11 @@ class Motion(NamedTuple):
     slip: np.ndarray
     along: np.ndarray
 
+    def part(self, points: np.ndarray | slice) -> Motion:
+        """Return the motion of some of the points (indices, shape (m,), or a slice)."""
+        return Motion(self.position[points], self.distance[points], self.normal[points], self.slip[points],
+                      self.along[points])
+
     def to(self, x: np.ndarray) -> Motion:
         """Predict distances and slips to first order at positions x, shape (n, c), length; gradients stay."""
         slip = self.slip + np.einsum("ni,ni->n", self.along, x - self.position)
@@ -513,7 +518,6 @@ class Law(NormalLaw):
         self.elastic_slip, self.adhesive = elastic_slip, adhesive
         self._set_friction(mu)
         self._slid: tuple[Nearest, ContactHistory, tuple] | None = None      # last geometry and history, and their slip
-        self._constants: tuple | None = None
 
     def with_friction(self, mu: np.ndarray | float) -> Law:
         """Return a copy of the law with other coefficients of friction, shape () or (n,)."""
@@ -526,17 +530,6 @@ class Law(NormalLaw):
         self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.has_history = self.has_friction or self.adhesive
-
-    def _with(self, **other: Any) -> Self:
-        return super()._with(_constants=None, **other)
-
-    def _given(self) -> tuple:
-        """Return the constants of the law as arguments of the C function `tractions`, stored for repeated calls."""
-        if self._constants is None:
-            flags = (self.adhesive, self.has_friction, self._slides)
-            self._constants = (np.array([self.theta, self.elastic_slip, *flags, STICKS]),
-                               self.k, np.ndim(self.k), self.mu, np.ndim(self.mu))
-        return self._constants
 
     def touching(self, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
         """Return the mask of the points in contact, shape (n,), bonded ones included; x: shape (n, 2), length."""
@@ -637,8 +630,9 @@ class Law(NormalLaw):
                 found = self.shear_limit(self.k * self.ramp(centre, self._bonded(old))[0], mu)
                 limit, grows = (np.broadcast_to(a, len(x)) for a in found)
         ahead = (None, None) if expected is None else (expected.distance, expected.slip)
-        _C.tractions(len(x), *self._given(), near.distance, near.normal, near.curvature,
-                     None if old is None else old.distance, g, dg, *ahead, sense, limit, grows, out)
+        constants = np.array([self.theta, self.elastic_slip, self.adhesive, self.has_friction, self._slides, STICKS])
+        _C.tractions(len(x), constants, self.k, np.ndim(self.k), self.mu, np.ndim(self.mu), near.distance, near.normal,
+                     near.curvature, None if old is None else old.distance, g, dg, *ahead, sense, limit, grows, out)
         return out
 
     def hoop_stiffness(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:

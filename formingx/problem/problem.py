@@ -72,6 +72,13 @@ class Problem:
         forms: fields, forms and scales of the scene (a `Formulation`).
         comm: MPI communicator.
         x: vector of unknowns; inside `state_context` the unknowns of the state.
+        n_owned: number of field unknowns that this rank owns.
+        setting: current step data (`StepData`).
+        constrained: local numbers of the constrained unknowns that this rank owns, shape (n,).
+        has_kinks: True if contacts are active.
+        has_history: True if F depends on earlier states.
+        body_has_history: True if materials or the temperature have history variables.
+        singular_unloaded: True if the body in the reference configuration has no stiffness in some direction.
         matrix: the tangent, reassembled by `tangent`.
         contacts: contacts of the scene (`FaceContact`).
         active_contacts: contacts that are active in the current stage.
@@ -89,7 +96,7 @@ class Problem:
         self.comm, forms = self.forms.comm, self.forms
         forms.compile_ahead(*forms.path_forms())
         index_map = forms.space.dofmap.index_map
-        self._n = index_map.size_local
+        self.n_owned = index_map.size_local
         self._buffer = la.vector(index_map, 1)
         self._residual = forms.compile(forms.residual)
         self.contacts = [FaceContact(forms, contact, self.assemble) for contact in scene.contacts]
@@ -97,11 +104,13 @@ class Problem:
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
         self.histories: list[History] = [*(c for c in self.contacts if c.has_history), *forms.histories]
+        self.has_history, self.body_has_history = bool(self.histories), bool(forms.histories)
+        self.singular_unloaded = forms.singular_unloaded
         self.limit = StepLimit(self)
         self.admissible = forms.admissible()
         self._constraints = Constraints(forms, self.assemble)
         last = self.comm.rank == self.comm.size - 1             # it has the multipliers
-        self.x = PETSc.Vec().createMPI((self._n + last * len(self._constraints.means), None), comm=self.comm)
+        self.x = PETSc.Vec().createMPI((self.n_owned + last * len(self._constraints.means), None), comm=self.comm)
         self._stage: Any = None
         self.enter(StepData.first(scene), np.zeros(self.x.getLocalSize()), 0.0)
         self.force_scale = 0.0
@@ -110,11 +119,6 @@ class Problem:
     def n_unknowns(self) -> int:
         """Number of unknowns of all ranks, fields and multipliers."""
         return int(self.x.getSize())
-
-    @property
-    def n_owned(self) -> int:
-        """Number of field unknowns that this rank owns."""
-        return int(self._n)
 
     @cached_property
     def _fields(self) -> np.ndarray:
@@ -145,17 +149,9 @@ class Problem:
         return all(x.symmetric for x in (*self.scene.loads, *self.scene.contacts, *self.scene.materials.values()))
 
     @property
-    def setting(self) -> StepData:
-        return self._stage.setting
-
-    @property
     def control(self) -> float:
         """Current control of the forms; inside `state_context` the control of the state."""
         return float(self._control)
-
-    @property
-    def constrained(self) -> np.ndarray:
-        return self._stage.constrained
 
     @property
     def constrained_rate(self) -> np.ndarray:
@@ -163,30 +159,25 @@ class Problem:
         return self._stage.rate
 
     @property
-    def has_kinks(self) -> bool:
-        return bool(self.active_contacts)
-
-    @property
     def active_set(self) -> Any:
-        status = tuple(c.increment.status.tobytes() for c in self.active_contacts)
-        return tuple(listed(self.comm, status)) if self.active_contacts else None
+        status = [c.increment.status.tobytes() for c in self.active_contacts]
+        return tuple(map(tuple, listed(self.comm, status))) if status else None
 
     @property
     def temperature(self) -> Temperature | None:
         """Temperature of the body at the last accepted state, or of `state_context`; None without one."""
         return self.forms.temperature
 
-    def set_fields_and_control(self, x: np.ndarray, control: float) -> None:
-        """Set the fields and the control of the forms; x: locally owned entries, shape (n,)."""
-        self._control[()] = control
-        self.set_fields(x)
-
-    def set_fields(self, x: np.ndarray) -> None:
-        """Set the fields of the forms from x, shape (n,), and update the coefficients that depend on them."""
-        self._fields[: self._n] = x[: self._n]
+    def set_fields(self, x: np.ndarray, control: float | None = None) -> None:
+        """Set the fields of the forms from x, shape (n,), and update the coefficients that depend on them.
+        control: of the forms; None: it stays."""
+        if control is not None:
+            self._control[()] = control
+        self._fields[: self.n_owned] = x[: self.n_owned]
         if self.comm.size > 1:
             self.forms.w.x.scatter_forward()
-        self.forms.refresh()
+        for coefficients in self.forms.refreshed:
+            coefficients.refresh()
 
     def motion(self, control: float) -> np.ndarray:
         """Return the prescribed values at the constrained unknowns, and 0 elsewhere; shape (n,), dimensionless."""
@@ -200,12 +191,12 @@ class Problem:
         Return the Lagrange multipliers of the means of boundaries (`ConstrainedMean`), shape (means,), on all ranks.
         """
         values, last = x.array_r, self.comm.size - 1
-        self.set_fields_and_control(values, control)
+        self.set_fields(values, control)
         if not last:
-            return values[self._n:].copy()
+            return values[self.n_owned:].copy()
         multipliers = np.zeros(len(self._stage.active.rows))
         if self.comm.rank == last:
-            multipliers[:] = values[self._n:]
+            multipliers[:] = values[self.n_owned:]
         if len(multipliers):
             self.comm.Bcast(multipliers, root=last)
         return multipliers
@@ -217,14 +208,14 @@ class Problem:
 
         V is the reference volume. Pressures and multipliers do not count.
         """
-        return self._dot(self._metric * a.array_r[: self._n], b.array_r[: self._n])
+        return self._dot(self._metric * a.array_r[: self.n_owned], b.array_r[: self.n_owned])
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
-        self.fill(out, self._metric * a.array_r[: self._n])
+        self.fill(out, self._metric * a.array_r[: self.n_owned])
 
     def stiff_state(self, out: PETSc.Vec) -> None:
         self.forms.set_stiff()
-        self.fill(out, self.forms.w.x.array[: self._n])
+        self.fill(out, self.forms.w.x.array[: self.n_owned])
 
     def assemble(self, form: Any) -> np.ndarray:
         """Assemble a compiled linear form at the current fields and control; owned entries, shape (n,)."""
@@ -237,15 +228,15 @@ class Problem:
     def fill(self, out: PETSc.Vec, values: np.ndarray, tail: list[float] | None = None) -> None:
         """Set a vector from owned field values, shape (n,), and multipliers of the last rank; None: 0."""
         array = out.array_w
-        array[: self._n] = values
-        array[self._n:] = 0.0 if tail is None or self.comm.rank < self.comm.size - 1 else tail
+        array[: self.n_owned] = values
+        array[self.n_owned:] = 0.0 if tail is None or self.comm.rank < self.comm.size - 1 else tail
 
     def _dot(self, a: np.ndarray, b: np.ndarray) -> float:
         """Return the dot product of two vectors of locally owned entries over all ranks."""
         return float(combined(self.comm, float(np.dot(a, b)), MPI.SUM))
 
     def residual(self, x: PETSc.Vec, control: float, out: PETSc.Vec) -> None:
-        stage, multipliers, fields = self._stage, self.set_state(x, control), x.array_r[: self._n]
+        stage, multipliers, fields = self._stage, self.set_state(x, control), x.array_r[: self.n_owned]
         values = self._forces(fields, control)
         self.force_scale = np.sqrt(self._dot(values, values))
         for multiplier, row in zip(multipliers, stage.active.rows, strict=True):
@@ -276,12 +267,12 @@ class Problem:
         """Return the internal minus external forces, contact included, without constraints; dimensionless, shape (n,).
         """
         self.set_state(x, control)
-        return self._forces(x.array_r[: self._n], control)
+        return self._forces(x.array_r[: self.n_owned], control)
 
     def body_forces(self, x: np.ndarray, control: float) -> np.ndarray:
         """Return the internal minus external forces without contact and constraints; dimensionless, shape (n,).
         In equilibrium supports and tools supply them."""
-        self.set_fields_and_control(x, control)
+        self.set_fields(x, control)
         return self.assemble(self._residual)
 
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
@@ -310,25 +301,21 @@ class Problem:
         with self.state_context(state):
             return self.admissible.volume_error_away(places, distance)
 
-    def inverted_elements(self) -> tuple[int, int, tuple[float, float]]:
-        """Return the numbers of inverted and of all elements, and (R, Z) of the smallest J; collective."""
-        return self.admissible.inverted_elements()
-
     def begin(self, old: Any = None) -> None:
         for contact in self.active_contacts:
-            contact.begin(*((None, 0.0) if old is None else (old.x[: self._n], old.control)))
+            contact.begin(*((None, 0.0) if old is None else (old.x[: self.n_owned], old.control)))
 
     def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
         if self.contacts:
-            values = F.array_r[: self._n].copy()
+            values = F.array_r[: self.n_owned].copy()
             for contact in self.active_contacts:
-                contact.linearise(values, x.array_r[: self._n], control)
-            values[self.constrained] = F.array_r[: self._n][self.constrained]
-            F.array_w[: self._n] = values
+                contact.linearise(values, x.array_r[: self.n_owned], control)
+            values[self.constrained] = F.array_r[: self.n_owned][self.constrained]
+            F.array_w[: self.n_owned] = values
 
     def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> PETSc.Mat:
         self.set_state(x, control)
-        fields = x.array_r[: self._n]
+        fields = x.array_r[: self.n_owned]
         return self._tangent.matrix.fill([(c.rule.dofs, c.tangent(fields, control, one_sided))
                                           for c in self.active_contacts])
 
@@ -347,31 +334,22 @@ class Problem:
         return self.forms.compile(self.forms.viscosity())
 
     def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
-        return [contact.one_sided_change(x.array_r[: self._n], control) for contact in self.active_contacts]
+        return [contact.one_sided_change(x.array_r[: self.n_owned], control) for contact in self.active_contacts]
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, one_sided: bool = False) -> None:
         self.set_state(x, control)
-        values = self._tangent.by_control(self.setting.rate, self.assemble, self._n)
+        values = self._tangent.by_control(self.setting.rate, self.assemble, self.n_owned)
         for contact in self.active_contacts:
-            contact.add_control_derivative(values, x.array_r[: self._n], control, one_sided)
+            contact.add_control_derivative(values, x.array_r[: self.n_owned], control, one_sided)
         values[self.constrained] = -self._stage.rate
         self.fill(out, values)
         if self._stage.unbalanced is not None:
             out.array_w += self._stage.unbalanced
 
     @property
-    def has_history(self) -> bool:
-        return bool(self.histories)
-
-    @property
     def materials(self) -> list[ConstitutiveHistory]:
         """History of each material with internal variables or past states (`ConstitutiveHistory`)."""
         return [history for history in self.forms.histories if isinstance(history, ConstitutiveHistory)]
-
-    @property
-    def body_has_history(self) -> bool:
-        """True if materials or the temperature have history variables."""
-        return bool(self.forms.histories)
 
     @property
     def relaxes(self) -> bool:
@@ -409,7 +387,7 @@ class Problem:
 
     def advance(self, x: np.ndarray, control: float) -> None:
         if self.forms.histories:
-            self.set_fields_and_control(x, control)
+            self.set_fields(x, control)
         known = self._predicted[1] if self._predicted[0] is x else []
         for history in self.histories[: len(self.histories) - len(known)]:
             history.advance(x[: self.n_owned], control)
@@ -423,7 +401,7 @@ class Problem:
         They are stored, and `advance` uses them if it accepts the same x, shape (n,). The caller must restore the
         earlier ones.
         """
-        self.set_fields_and_control(x, control)
+        self.set_fields(x, control)
         for history in self.forms.histories:
             history.advance(x[: self.n_owned], control, start)
         after = [history.get() for history in self.forms.histories]
@@ -467,7 +445,7 @@ class Problem:
     def fading_forces(self) -> np.ndarray | None:
         """Unbalanced forces f of changed items, shape (n,), dimensionless, or None.
         The residual loses (1 - control) f."""
-        return None if self._stage.unbalanced is None else self._stage.unbalanced[: self._n]
+        return None if self._stage.unbalanced is None else self._stage.unbalanced[: self.n_owned]
 
     def enter(self, setting: StepData, x: np.ndarray, control: float) -> None:
         before = self._stage
@@ -477,7 +455,7 @@ class Problem:
         active = before.active if same else self._constraints.active(set(setting.inactive))
         rate, constrained = np.append(setting.rate, 0.0)[active.driver][active.owned], active.dofs[active.owned]
         stage = _Stage(setting, active, constrained, x[constrained] - rate * control, rate,
-                       [self._dot(row, x[: self._n]) for row in active.rows])
+                       [self._dot(row, x[: self.n_owned]) for row in active.rows])
         self._set_stage(stage)
         if setting.fading and control < 1:
             unknowns, unbalanced = self.x.duplicate(), self.x.duplicate()
@@ -498,6 +476,7 @@ class Problem:
             i = number[id(contact.contact)]
             contact.enter(setting.base[i], setting.rate[i], i not in setting.inactive)
         self.active_contacts = [contact for contact in self.contacts if contact.active]
+        self.setting, self.constrained, self.has_kinks = setting, stage.constrained, bool(self.active_contacts)
         if "_tangent" in vars(self):
             self._tangent.enter(stage.active, setting.rate, before is None or before.active is not stage.active)
 
@@ -550,7 +529,7 @@ class Problem:
     def fixed_loads(self) -> list[str]:
         return [repr(load) for load in self.scene.loads if not load.driven]
 
-    @property
+    @cached_property
     def main_columns(self) -> list[str]:
         return ["process_time", *map(self.scene.column, self.scene.drivable), "pole_height", "pole_stretch"]
 
@@ -562,11 +541,6 @@ class Problem:
     def units(self) -> tuple[float, float]:
         """Units of the dimensionless energy of the whole part (stress length^3) and of length, in the user's units."""
         return self.scene.symmetry_factor * self.forms.stress * self.forms.volume, self.forms.length
-
-    @property
-    def singular_unloaded(self) -> bool:
-        """True if the body in the reference configuration has no stiffness in some direction."""
-        return self.forms.singular_unloaded
 
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""

@@ -82,11 +82,12 @@ def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
 
     It is above 1e9 times the shear modulus, or the extent of the body.
     """
-    units = {"pressure": ("the shear modulus", max(scene.shear_modulus(name) for name in scene.mesh.layers)),
-             "travel": ("the length of the body", float(max(scene.extent)))}
-    if quantity not in units:
+    if quantity == "pressure":
+        what, unit = "the shear modulus", max([scene.shear_modulus(name) for name in scene.mesh.layers])
+    elif quantity == "travel":
+        what, unit = "the length of the body", float(max(scene.extent))
+    else:
         return None
-    what, unit = units[quantity]
     if ROUND_OFF * abs(value) <= unit:                       # beyond it the unit is round-off of the value
         return None
     return f"it is {abs(value) / unit:.2g} times {what}, {unit:.4g} (are the units right?)"

@@ -323,8 +323,8 @@ class _Points:
         counts = listed(self._comm, self._c * sum(map(len, chosen)))
         first = sum(counts[: self._comm.rank])
         self._own = slice(first, first + counts[self._comm.rank])
-        ends = np.cumsum([0, *(len(i) for _, i in self._some)])
-        self._parts = [slice(a, b) for a, b in zip(ends, ends[1:])]     # slices of the owned points of each contact
+        ends = np.cumsum([0, *map(len, chosen)])
+        self._parts = [slice(a, b) for a, b in zip(ends, ends[1:]) if b > a]    # of the owned points of each contact
         self._columns = columns(solver, unit_forces(problem, contacts, chosen), border)
         scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
@@ -340,7 +340,7 @@ class _Points:
         laws, ramps = [c.increment.law_at(i) for c, i in self._some], list[Any]()
         y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
-        accuracy = _LOCAL.accuracy * min(c.increment.ramp for c in self._contacts)
+        accuracy = _LOCAL.accuracy * min([c.law.theta for c in self._contacts])
         for k in range(_LOCAL.max_iterations):
             f, S = self._law(laws, y)
             added = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
@@ -410,7 +410,7 @@ class _Points:
     def _moved(self, dx: Array, step: Array | float) -> Array:
         """Return the motions of the p owned points by dx, shape (n,) or (n, m), and step; collective.
         They are relative to the tools, shape (p c,) or (p c, m), length."""
-        motions = (c.relative_motion(dx, step)[i] for c, i in zip(self._contacts, self._chosen))
+        motions = [c.relative_motion(dx, step)[i] for c, i in zip(self._contacts, self._chosen)]
         return np.concatenate([motion.reshape(-1, *dx.shape[1:]) for motion in motions])
 
     def _linearised(self) -> tuple[Array, Array]:

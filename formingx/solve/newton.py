@@ -164,7 +164,7 @@ class Iteration(NamedTuple):
 
 def tangents(history: list[Iteration]) -> int:
     """Return the number of iterations with a new tangent; the last entry, the converged state, does not count."""
-    return sum(not iteration.chord for iteration in history[:-1])
+    return sum([not iteration.chord for iteration in history[:-1]])
 
 
 class Failure(Exception):
@@ -375,7 +375,7 @@ class BorderedNewton:
                 raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
             if history:
                 self._modified.note_iteration(history[-1].chord, residual / (history[-1].residual or 1.0))
-            if self.tolerances.converged([i.correction for i in history], [*(i.residual for i in history), residual],
+            if self.tolerances.converged([i.correction for i in history], [*[i.residual for i in history], residual],
                                    bool(history) and history[-1].chord, not problem.has_kinks):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
@@ -420,7 +420,7 @@ class BorderedNewton:
         """
         settings, quiet = self.settings, history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
-        diverged = len(history) > 2 and min(i.correction for i in history[-3:]) > settings.divergence_correction
+        diverged = len(history) > 2 and min([i.correction for i in history[-3:]]) > settings.divergence_correction
         if diverged or grown and not (self.problem.has_kinks and moved < settings.small_correction):
             raise Failure("Newton's method diverges", history)
         if active.returns >= settings.max_cycles:

@@ -417,7 +417,8 @@ class Run:
             self.curve.update_path_tangent(state)
         self.targets.accept(state)
         record.counts.iterations += self.curve.spent()
-        log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
+        if log.isEnabledFor(logging.INFO):
+            log.info("state %d: %s, %d iterations", record.counts.steps, record.describe(state), len(state.history) - 1)
 
     def _give_up(self, why: str, attempt: Attempt | None = None, pace: str = "", hint: str = _TRY) -> None:
         """Raise the `ConvergenceError` of a run that ends before its target, for the reason `why`, with a diagnosis.

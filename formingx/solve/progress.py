@@ -51,7 +51,7 @@ class RunTargets:
 
     def is_open(self) -> bool:
         """Return True until the last target, or the other target that ends the run (`requested`), is met."""
-        return all(any(target is end for target, _ in self.open) for end in self._ends)
+        return all([any([target is end for target, _ in self.open]) for end in self._ends])
 
     def gained(self, value: float | None = None) -> float:
         """Return (value - first value)/(target - first value), by default at the last state; 1 at the last target."""

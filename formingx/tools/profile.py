@@ -162,7 +162,8 @@ class Tool:
             Distances, positive inside the tool, shape (n,), length; gradients, shape (n, 2); curvatures, shape (n,),
             1/length.
         """
-        x = as_points("Tool: x", x)
+        if type(x) is not np.ndarray or x.dtype != float or x.shape[1:] != (2,):
+            x = as_points("Tool: x", x)
         n = len(x)
         distance, normal, curvature = np.empty(n), np.empty((n, 2)), np.empty(n)
         _C.nearest(n, x, len(self.table), self.lines, self.table, distance, normal, curvature)

@@ -224,7 +224,7 @@ class ContactEventSequence:
             if s < length and closure.rank == self._comm.rank:
                 arc_lengths[i], positions[i], speeds[i] = s, closure.place, self._piece(s).speed[i]
         points.spread(piece.extended(len(points.point_ids)).status != ContactStatus.FREE, sure)
-        return tuple(points.of_faces(values) for values in (arc_lengths, positions, sure, speeds))
+        return tuple(map(points.of_faces, (arc_lengths, positions, sure, speeds)))
 
     def positions(self, length: float) -> list[np.ndarray]:
         """Return for each face the positions of its owned points relative to the tool at an arc length, shape (n, 2).
@@ -265,7 +265,7 @@ class ContactEventSequence:
 
     def _piece(self, length: float) -> PathSegment:
         """Return the segment of the predicted path at an arc length: the last one that begins before it."""
-        return next(piece for piece in self._pieces[::-1] if piece.begins < length or not piece.begins)
+        return [piece for piece in self._pieces if piece.begins < length or not piece.begins][-1]
 
     def _free_sliding(self) -> bool:
         """Apply Coulomb's law to the points that slide at the accepted state; return False if this fails.
@@ -471,7 +471,7 @@ class ContactEventSequence:
         weights, after = np.append(share, 1 - share.sum()), [piece for _, piece in tried]
 
         def mean(values: list) -> Any:
-            return sum(w * v for w, v in zip(weights, values))
+            return sum([w * v for w, v in zip(weights, values)])
         return after[-1]._replace(
             begins=float(mean([p.begins for p in after])), force=mean([p.force for p in after]),
             positions=mean([p.positions for p in after]), extra=mean([p.extra for p in after]),

@@ -50,8 +50,8 @@ class ContactEventPredictor:
     def active(self) -> bool:
         """True if contact events are predicted: a contact allows several closures, all laws are predictable."""
         contacts = self._limit.active_contacts
-        return any(self.allowed(c) > c.max_closures for c in contacts) and all(
-            c.face.law.predictable for c in contacts)
+        return any([self.allowed(c) > c.max_closures for c in contacts]) and all(
+            [c.face.law.predictable for c in contacts])
 
     def predict(self, curve: Any, state: Any) -> ContactEventPrediction | None:
         """Return the contact events after an accepted state.
@@ -92,7 +92,7 @@ class ContactEventPrediction:
         tool. None if the prediction failed.
         """
         found, sequence = self._length_to_closures(length) if self._known else None, self._sequence
-        slides = not any(c.face.contact.sticks for c in self._contacts)
+        slides = not any([c.face.contact.sticks for c in self._contacts])
         if found is not None and slides and LIMITS.start_fraction * length < sequence.slip_ends < found:
             found = LIMITS.overshoot * sequence.slip_ends
         while found is not None and found > LIMITS.min_length and any(
@@ -151,8 +151,8 @@ class ContactEventPrediction:
         if not self._sticking:
             return False
         x = self._sequence.positions(length)
-        tension = any(np.any(N + np.einsum("ni,ni->n", slope, x[f][closed] - start) < 0)
-                      for f, closed, N, start, slope in self._sticking)
+        tension = any([np.any(N + np.einsum("ni,ni->n", slope, x[f][closed] - start) < 0)
+                       for f, closed, N, start, slope in self._sticking])
         return bool(combined(self._contacts[0].face.comm, tension, MPI.LOR))
 
     def closures(self, length: float) -> list[tuple] | None:

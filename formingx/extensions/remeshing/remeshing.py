@@ -238,7 +238,7 @@ def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segme
             reason = reason or str(getattr(error, "reason", error))
             continue
         segment.problem.x.array_w[:] = start.x
-        segment.problem.set_fields_and_control(start.x, start.control)
+        segment.problem.set_fields(start.x, start.control)
         smallest, largest = segment.problem.admissible.volume_ratios()
         found.append((min((smallest - low) / (1 - low), (high - largest) / (high - 1)), segment, start))
         if found[-1][0] > _GOOD_MARGIN:

@@ -62,11 +62,6 @@ class Surface(Formulation):
         """Return the normal of a face (UFL, shape (3,)) and the measure over the reference area, of degree 1."""
         return self.mesh.faces[name] * self._axes[2], self.dx(metadata={"quadrature_degree": 1})
 
-    def refresh(self) -> None:
-        super().refresh()
-        if self._on_tools is not None:
-            self._on_tools.refresh()
-
     def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray | float:
         """Return the forces of pressures on a tool between the m contact points of a face, shape (m, 3).
 
@@ -80,6 +75,7 @@ class Surface(Formulation):
         if not pressures or all(contact.sticks for contact in self.scene.contacts):
             return residual, by_control, by_time
         self._on_tools = PressureOnTools(self)
+        self.refreshed.append(self._on_tools)
         for load, value in pressures:
             face = body.face(load.on, load.quadrature_degree)
             area = self.scene.kinematics.area_vector(self.u, self.X, face.normal)

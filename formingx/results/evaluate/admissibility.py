@@ -142,7 +142,7 @@ class AdmissibilityCheck:
             yield (f"the elements do not keep their volumes: the root mean square of J - 1 is"
                    f" {measures['volume_error']:.2g}")
         with self._problem.state_context(state) as problem:
-            bad, cells, (R, Z) = problem.inverted_elements()
+            bad, cells, (R, Z) = problem.admissible.inverted_elements()
             if bad > max(_LIMITS.allowed_elements, _LIMITS.inverted_elements * cells):
                 yield (f"{bad} of {cells} elements are inside out, the worst at (R, Z) = ({R:.5g}, {Z:.5g}):"
                        " remesh on the way (trace(remesh=Remesh(size=...)), for a crushed block), or adapt the mesh"

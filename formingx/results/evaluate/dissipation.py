@@ -36,7 +36,7 @@ def dissipated_energy(segment: Segment, states: list[State], power: Quantity) ->
             problem.clock = time
         time = problem.forms.time_at(control)
         problem.x.array_w[:] = x
-        problem.set_fields_and_control(x, control)
+        problem.set_fields(x, control)
         for history in problem.materials:
             history.advance(x, control)
         half = power.value(problem.x, control)

@@ -182,7 +182,7 @@ class EnergyBalance:
             n, fading = problem.n_owned, problem.fading_forces
             for s, w in zip(*GAUSS):
                 rate = x.slope(s)[:n]
-                problem.set_fields_and_control(x.value(s), control.value(s))
+                problem.set_fields(x.value(s), control.value(s))
                 for name, form in self._loads:
                     found[name] += w * self._sum(problem.assemble(form) * rate)
                 if fading is not None:
