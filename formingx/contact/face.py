@@ -285,10 +285,7 @@ class FaceContact:
 
     def forces(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the forces on the tool near the points, shape (n, components), stress length^2; collective.
-
-        They are contact forces at the points, and in three dimensions pressure that acts on the tool between them.
-        fields: owned unknowns.
-        """
+        They are contact forces and, in three dimensions, pressure on the tool between points. fields: owned."""
         between = self._solid.carried_forces(self, fields, control)
         return self.area[:, None] * self.tractions(fields, control).force + between
 

@@ -130,10 +130,7 @@ class Formulation(ABC):
         return EnergyRule.of_degree(self.domain.basix_cell(), self.scene.quadrature_degree)
 
     def mean_over_depths(self, law: Callable, terms: MaterialTerms) -> Callable:
-        """Return the law f(T) of a coefficient at one quadrature point, for the temperatures of `temperatures`.
-
-        A sheet may give temperatures at several depths of a point; the coefficient is then the mean of f.
-        """
+        """Return the law f(T) of a coefficient at a point; for temperatures at several depths the mean of f."""
         return law
 
     def _add_materials(self) -> None:

@@ -36,10 +36,7 @@ class Temperature:
         return np.clip(self._given.in_cells(cells, places, np.array(values)), *self.limits)
 
     def at_points(self, points: np.ndarray, depth: np.ndarray | None = None) -> np.ndarray:
-        """Return the temperatures at points, shape (n, 2), length, of each rank, within `limits`; collective.
-
-        The depth in a sheet is not used: this temperature is uniform through the thickness of a sheet.
-        """
+        """Return the temperatures at points, shape (n, 2), length, within `limits`; collective. `depth` is not used."""
         return np.clip(fields.values_at(self.T, np.asarray(points, dtype=float), self._given.mesh), *self.limits)
 
     def nodes(self, points: np.ndarray, boundary: str) -> np.ndarray:

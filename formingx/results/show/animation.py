@@ -65,7 +65,8 @@ def _ffmpeg() -> str | None:
 def has_image_at_axis(scene: Any) -> bool:
     """Return True if the part has a mirror image at r = 0: a ring, or a half with its mirror plane there."""
     ring = scene.kinematics.dimension_of_volume == 3
-    return ring or any(plane.axis == 0 and abs(plane.position) <= scene.symmetry.near for plane in scene.symmetry.planes)
+    near = scene.symmetry.near
+    return ring or any(plane.axis == 0 and abs(plane.position) <= near for plane in scene.symmetry.planes)
 
 
 def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
