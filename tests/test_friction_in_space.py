@@ -242,3 +242,23 @@ def test_plug_tray_quick(tmp_path):
     assert quarter["weight_g"] == pytest.approx(sheet, rel=0.01)
     assert ratio["weight_g"] == pytest.approx(1.0, rel=1e-6) and max(abs(v - 1) for v in ratio.values()) < 5e-3
     assert quarter["touching"] > 0.95 and 0.5 < quarter["least_wall_mm"] < 0.9
+
+
+@pytest.mark.parametrize("friction", ["none", 0.3])
+def test_thin_sheets_deform_and_let_go_alike(friction):
+    """Steps, walls and forces over the thickness are those of a sheet of 0.01 times its extent, also as a ball lifts.
+
+    Where the sheet should let go of the ball, it pulls at it by no more than 1e-5 of the largest force.
+    """
+    found = []
+    for thickness in (1e-2, 4e-4, 3e-6):
+        sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=0.2)
+        scene = fx.Scene(mesh=sheet, thickness=thickness, materials=MATERIAL, supports=HELD, contacts=[
+            fx.Contact("top", fx.tools.revolved(BALL), friction, direction=(0, 0, -1), name="ball")])
+        path = fx.Process(scene).run([fx.Stage("push", control="ball", until=fx.travel(0.4)), fx.Stage(
+            "lift", control="ball", until=fx.travel(-0.02))], progress=False)
+        assert path["tool_force"].min() > -1e-5 * path["tool_force"].max()
+        found.append((path["tool_force"] / thickness, path.wall(path.states[8]).ratio))
+    for force, wall in found[1:]:
+        np.testing.assert_allclose(force, found[0][0], atol=1e-5)
+        np.testing.assert_allclose(wall, found[0][1], rtol=1e-6)

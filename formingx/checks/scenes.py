@@ -180,12 +180,14 @@ def _contact_penalties(body: SizedBody) -> Iterator[Finding]:
     presses = [abs(t.value) for t in body.targets if t.name.endswith("pressure")] if pressed else []
     for contact in body.scene.contacts:
         traction = max([stress * body.thickness / body.length, *presses])
-        depth = traction / (contact.penalty * stress)
+        scale = contact.reference_length(body.thickness, body.length) / body.thickness
+        depth = scale * traction / (contact.penalty * stress)
         if depth > MEASURED_ACCURACY:
             cause = "the target pressure" if presses else "a pressure of shear modulus times thickness over length"
             yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g} lets {cause},"
-                          f" {body.format(traction, 'stress', 3)}, press the face {percent(depth)} of the thickness"
-                          f" into the tool: use {traction / (0.001 * stress):.1g} or more")
+                          f" {body.format(traction, 'stress', 3)}, press the face {percent(depth)} of"
+                          f" {'the thickness' if scale == 1 else 'a hundredth of the extent'} into the tool: use"
+                          f" {scale * traction / (0.001 * stress):.1g} or more")
         if contact.penalty > 1e9:
             yield Finding("warning", repr(contact), f"penalty = {contact.penalty:g}: so stiff that round-off"
                           f" leaves few digits for the body; the default is 2e5")

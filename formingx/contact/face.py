@@ -189,6 +189,7 @@ class FaceContact:
         points: their reference positions, shape (n, components), length.
         law: contact law at the points.
         thickness: thickness of the body behind the face, length.
+        reference_length: length to which penalty, ramp and elastic slip refer (`Contact.reference_length`).
         increment: the current `Increment`.
         history: history variables of the contact law; None if it has none, as without friction.
         displacement: function of owned unknowns, see `Rule.displacement`.
@@ -210,6 +211,7 @@ class FaceContact:
                            Gauss(solid, contact.on, int(contact.points)))
         self.points, self.thickness = self.rule.points, solid.thickness(contact.on)
         self.displacement, self.add = self.rule.displacement, self.rule.add
+        self.reference_length = contact.reference_length(self.thickness, solid.length)
         self._warm = solid.temperature.nodes(self.rule.nodes, contact.on) if contact.friction_by_temperature else None
         self._penalty = np.ones(len(self.points))
         self.unbalanced = np.zeros(self.points.shape[1])
@@ -371,11 +373,11 @@ class FaceContact:
     @property
     def _reference_penalty(self) -> float:
         """Penalty of the contact in the reference configuration, stress/length."""
-        return self.contact.penalty * self._solid.stress / self.thickness
+        return self.contact.penalty * self._solid.stress * self.thickness / self.reference_length**2
 
     def _law(self, penalty: np.ndarray | float) -> Any:
         """Return the contact law at the points; penalty: current over reference penalty, shape () or (n,)."""
-        law: Any = self.contact.law(self._reference_penalty * penalty, self.thickness, self.points,
+        law: Any = self.contact.law(self._reference_penalty * penalty, self.reference_length, self.points,
                                     self._temperatures())
         if self.shift is not None:
             law.shift = self.shift

@@ -52,6 +52,9 @@ _SLIDES, _STICK, _BONDED = (2e5, 1e-7), (2e5, 1e-5), (2e4, 1e-5)
 
 The last pair also belongs to every tool in three dimensions; a stiffer penalty would cost iterations there."""
 
+_THIN = 0.01
+"""Thickness over largest extent of a sheet in three dimensions, below which this extent scales contact."""
+
 
 class Contact(ScenePart):
     r"""Contact of a boundary of the body with a rigid tool, by a penalty k (Song 1993, eqs. (5.7) and (5.13)).
@@ -72,7 +75,8 @@ class Contact(ScenePart):
         ramp: half-width theta of the contact ramp, divided by the thickness of the sheet. The default is 1e-7 where
             points slide, 1e-5 where they stick and in three dimensions.
         elastic_slip: elastic slip g_s, the tangential motion of a point before it slides, divided by the thickness of
-            the sheet.
+            the sheet. A sheet in three dimensions that is thinner than 0.01 times its extent L has the ramp and the
+            slip of the thickness 0.01 L, and a penalty so soft that its penetration over L is that of this thickness.
         separates: False: points that have been in contact stay in contact, with "stick" or "none". Examples are a tacky
             sheet, or a plug to which the sheet is bonded. The default is True. In three dimensions the default for
             "stick" is False: a point stays in contact until a stage of a process makes the tool inactive. With True,
@@ -218,13 +222,21 @@ class Contact(ScenePart):
                              f" least 0")
         return mu
 
+    def reference_length(self, thickness: float, extent: float) -> float:
+        """Return the length to which penalty, ramp and elastic slip refer: the thickness of the body.
+
+        In three dimensions it is at least a hundredth of the largest extent of the sheet, a membrane, whose deformation
+        does not depend on the thickness.
+        """
+        return max(thickness, _THIN * extent) if self.lagged else thickness
+
     def law(self, k: np.ndarray | float, thickness: float, points: np.ndarray,
             temperature: np.ndarray | None = None) -> ContactLaw:
         """Return the contact law of this contact: tractions at n contact points as a function of their positions.
 
         Args:
             k: penalty, shape () or (n,), stress/length.
-            thickness: thickness of the sheet, length; `ramp` and `elastic_slip` are multiplied by it.
+            thickness: `reference_length` of the sheet, length; `ramp` and `elastic_slip` are multiplied by it.
             points: reference positions of the points, shape (n, 2), length; not used in three dimensions.
             temperature: temperature of the body at the points, shape (n,), if friction depends on the temperature.
 

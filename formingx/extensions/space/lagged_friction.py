@@ -27,10 +27,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...physics.contact_law import ContactHistory, ContactStatus, Motion, Tractions, outer
-from ...values.tolerances import NEGLIGIBLE
 from .lagged_stick import LaggedStick
 
 _MAX_PRESSURE_RATIO = 10.0  # factor, up or down, from the last pressure to the pressure that limits friction
+_TENSION = 1e-5            # distance outside the tool over theta, from which on a point in contact is in tension
 _SLIDES_ON = 1 + 1e-9      # stored slip of sliding points, over g_s: they continue to slide in spite of round-off
 
 
@@ -92,7 +92,7 @@ class LaggedFriction(LaggedStick):
 
     def in_tension(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
         """Return the mask of the points in contact that lie outside the tool, shape (n,); x: shape (n, 3), length."""
-        return self.in_contact(old) & (self.distance(x) < -NEGLIGIBLE * self.theta)
+        return self.in_contact(old) & (self.distance(x) < -_TENSION * self.theta)
 
     def start(self, x: np.ndarray) -> ContactHistory:
         """Return the history variables of points at x, shape (n, 3), length, without slip."""

@@ -190,7 +190,7 @@ class LaggedApproach(Approach):
         if variables is None:
             return False
         old, x, theta = variables.history, face.positions(fields, control), face.law.theta
-        late = face.law.distance(x) > LIMITS.negligible_gap * face.thickness
+        late = face.law.distance(x) > LIMITS.negligible_gap * face.reference_length
         if face.law.sticks:                                 # also behind a thin part of the tool
             late = np.isfinite(face.law.entries(old.position, x, late))
         late &= old.distance <= -theta

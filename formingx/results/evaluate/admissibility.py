@@ -105,10 +105,11 @@ class AdmissibilityCheck:
         Returns:
             The findings; empty if all penetrations are small. In a section a finding is a warning: penetration changes
             a tool force by more than 0.2 % (`WARNED_ERROR`), or the face lies deeper in a tool than a tenth of the
-            thickness (`CUT`). In three dimensions a finding is "serious": a contact point lies deeper than that tenth.
+            thickness (`CUT`). In three dimensions a finding is "serious": a contact point lies deeper than a tenth
+            of `FaceContact.reference_length`.
         """
         if not self._solid:
-            deepest = self._deepest_points(state, lambda contact: CUT * contact.thickness)
+            deepest = self._deepest_points(state, lambda contact: CUT * contact.reference_length)
             return [Finding("serious", deep.name, f"{deep.words}: shorter steps (StepControl(length=...)), or a larger"
                                                   " penalty.") for deep in deepest]
         with self._problem.state_context(state):
