@@ -61,7 +61,7 @@ def stuck(elements, size, ratios):
         "reached_ratio": HALF_HEIGHT / (HALF_HEIGHT - path.last.measures["travel"]),
         "remesh_at_ratio": [HALF_HEIGHT / (HALF_HEIGHT - state.measures["travel"]) for state in made],
         "jumps": {what: [state.jump[what] for state in made] for what in ("force", "energy", "volume")},
-        "triangles": [s.problem.scene.mesh.domain.topology.index_map(2).size_local for s in path.segments],
+        "triangles": [s.problem.scene.mesh.domain.topology.index_map(2).size_local for s in path.record.segments],
         "steps": path.counts.steps, "newton_iterations": path.counts.iterations}
 
 

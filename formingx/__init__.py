@@ -125,4 +125,4 @@ __version__ = "0.1.0"
 
 for _module in (mesh, tools, _sys.modules[__name__]):
     _calls.explain(_module)
-_interrupts.restore_excepthook()
+_interrupts.importing.restore()

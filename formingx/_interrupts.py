@@ -1,23 +1,31 @@
-"""Message of one line for Ctrl-C while the package is imported, which takes some seconds."""
+"""Errors that are printed as one line if nothing catches them, such as Ctrl-C while the package is imported."""
 
 import sys
 from typing import Any
 
-_usual = sys.excepthook
+
+class OneLine:
+    """A `sys.excepthook` that prints an uncaught error of one type as one line, and others as the hook before it.
+
+    Args:
+        kind: type of the error.
+        text: the line; "" for the message of the error.
+    """
+
+    def __init__(self, kind: type[BaseException], text: str = ""):
+        self._kind, self._text, self._usual = kind, text, sys.excepthook
+        sys.excepthook = self
+
+    def __call__(self, kind: Any, error: BaseException, trace: Any) -> None:
+        if isinstance(error, self._kind):
+            print(self._text or error, file=sys.stderr)
+        else:
+            self._usual(kind, error, trace)
+
+    def restore(self) -> None:
+        """Restore the hook that was in place before, unless another has replaced this one."""
+        if sys.excepthook is self:
+            sys.excepthook = self._usual
 
 
-def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
-    """Print an uncaught KeyboardInterrupt as one line, and other errors as usual; a `sys.excepthook`."""
-    if isinstance(error, KeyboardInterrupt):
-        print("interrupted while formingx was imported", file=sys.stderr)
-    else:
-        _usual(kind, error, trace)
-
-
-def restore_excepthook() -> None:
-    """Restore the `sys.excepthook` that was in place before the import of the package."""
-    if sys.excepthook is _one_line:
-        sys.excepthook = _usual
-
-
-sys.excepthook = _one_line
+importing = OneLine(KeyboardInterrupt, "interrupted while formingx was imported")

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ._interrupts import OneLine
+
 
 class InputError(ValueError):
     """Argument that is not allowed; the message gives its name, its value and the allowed values.
@@ -63,20 +65,8 @@ class Interrupted(KeyboardInterrupt):
     def __init__(self, message: str, path: Any = None):
         super().__init__(message)
         self.path = path
-        if sys.excepthook is not _one_line:
-            _usual.append(sys.excepthook)
-            sys.excepthook = _one_line
-
-
-_usual: list[Any] = []
-
-
-def _one_line(kind: Any, error: BaseException, trace: Any) -> None:
-    """Print an uncaught `Interrupted` as one line, and other errors as usual; a `sys.excepthook`."""
-    if isinstance(error, Interrupted):
-        print(error, file=sys.stderr)
-    else:
-        _usual[-1](kind, error, trace)
+        if not isinstance(sys.excepthook, OneLine):
+            OneLine(Interrupted)
 
 
 def positive(name: str, value: Any) -> float:

@@ -55,7 +55,7 @@ def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, 
             raise
         first = error.path
         log.warning("the pilot run ended early, at %s; the mesh is adapted to its states",
-                    first.describe(first.last))
+                    first.record.describe(first.last))
     # a resumed run reads the stored states, so its mesh is made from them, too
     adapted = meshes.make(first if folder is None else _stored_pilot(folder, scene) or first, options)
     log.info("pilot run: %d states on %d elements; adapted: %d", len(first), *(
@@ -166,13 +166,14 @@ def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
         path = first_with_states()
         if path is not None:
             error.path = path                               # type: ignore[attr-defined]
-            error.add_note(f"`error.path` has the {len(path)} states before it, up to {path.describe(path.last)}")
+            error.add_note(f"`error.path` has the {len(path)} states before it, up to"
+                           f" {path.record.describe(path.last)}")
         raise
     except KeyboardInterrupt:
         path = first_with_states()
         if path is None:
             raise Interrupted("interrupted before its first state") from None
-        position = f"at {path.describe(path.last)}, after {len(path)} states"
+        position = f"at {path.record.describe(path.last)}, after {len(path)} states"
         advice = "it is lost; with checkpoint='folder', resume=True the same script would continue from there"
         if checkpoint:
             advice = f"checkpoint={str(checkpoint)!r} holds it: the same script continues with resume=True"

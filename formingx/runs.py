@@ -130,7 +130,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
 
         def part() -> None:
             """Continue the run from its last state, on the mesh of this state."""
-            on_the_way = [t for t in intermediate if len(path.segments) == 1 or path.target_state(t) is None]
+            on_the_way = [t for t in intermediate if len(path.record.segments) == 1 or path.target_state(t) is None]
             targets = [(target, target.bind(path.problem)) for target in (*on_the_way, until)]
             run = Run(path.record, targets, step, at_limit_point)
             run.follow(max_steps, progress, None if path.states else begin(path.record.curve), may_turn=True)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
+from formingx.extensions.adapt.column_factors import column_factors
 
 PLUG = fx.tools.male(radius=3.0, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=0.5)
 
@@ -146,4 +147,4 @@ def test_column_factors_need_a_mesh_with_columns(tmp_path):
                      loads=[fx.Pressure("bottom")], supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
     path = fx.trace(scene, until=fx.pole_height(0.1), progress=False)
     with pytest.raises(fx.InputError, match="column_factors: the mesh has no columns"):
-        path.column_factors(0.3, None)
+        column_factors(path, 0.3, None)

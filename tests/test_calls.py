@@ -11,6 +11,7 @@ import pytest
 from conftest import treloar
 
 import formingx as fx
+from formingx.extensions.adapt.column_factors import column_factors
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +40,7 @@ def path():
     (lambda p: fx.Units("mm").mass(np.nan, 1.0), "volume = nan: must be a finite number"),
     (lambda p: fx.NeoHookean(c10=1.0).plot("x"), "NeoHookean.plot: axes = .*: must be an Axes or None"),
     (lambda p: fx.KBKZ.of_viscosities(range(3)), "spectrum = .*: must be a list of"),
-    (lambda p: p.column_factors(np.nan, None), "max_rotation = nan: must be a finite number"),
+    (lambda p: column_factors(p, np.nan, None), "max_rotation = nan: must be a finite number"),
     (lambda p: p.stability(states=np.array([])), "stability: states"),
     (lambda p: p.wall().at_height(), r"Wall.at_height: missing"),
     (lambda p: p.problem.scene.mesh.nodes_of("side"), "boundary 'side' is not known; known: 'axis', 'rim'"),

@@ -105,7 +105,8 @@ RUNS = {
 
 def integral(path, y, x):
     """Of a column over another, both monotone cubics between the states, by arc length."""
-    pieces = [path.distance(a, b) or 1e-12 for a, b in zip(path.states, path.states[1:])]
+    pieces = [path.record.curve.progress(a, b) * (a.setting == b.setting) or 1e-12
+              for a, b in zip(path.states, path.states[1:])]
     s = np.concatenate([[0.0], np.cumsum(pieces)])
     y, slope = PchipInterpolator(s, path[y]), PchipInterpolator(s, path[x]).derivative()
     fine = np.concatenate([np.linspace(a, b, 40, endpoint=False) for a, b in zip(s, s[1:])] + [s[-1:]])

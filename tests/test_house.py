@@ -9,8 +9,8 @@ from collections import Counter
 from conftest import ROOT
 
 PACKAGE = ROOT / "formingx"
-ROOMS = ["errors", "ranks", "findings", "_jit", "_compat", "units", "io", "figures", "values", "mesh", "tools",
-         "physics", "materials", "scene", "forms", "contact", "problem", "measures", "solve", "results"]
+ROOMS = ["_interrupts", "errors", "ranks", "findings", "_jit", "_compat", "units", "io", "figures", "values", "mesh",
+         "tools", "physics", "materials", "scene", "forms", "contact", "problem", "measures", "solve", "results"]
 # a room that is not listed is above them all
 EXTENSIONS = {"contact_events", "heat", "space", "stability", "design", "remeshing", "kbkz", "fits", "release",
               "compare", "study", "adapt"}

@@ -298,7 +298,7 @@ def test_pictures_and_reports_mark_jumps(balloon, tmp_path):
 def test_a_jump_that_is_solved_again_keeps_its_lost_work():
     """As where points separate after it; the target, the kind and the sense of the tangent stay, too."""
     path = fx.trace(Balloon().scene(), until=fx.pole_stretch(1.5), progress=False)
-    curve, (*_, old, last) = path.segments[-1].curve, path.states
+    curve, (*_, old, last) = path.record.segments[-1].curve, path.states
     jumped = replace(last, kind="jump", jump={"dissipated": 0.5}, direction=-last.direction, slope=-last.slope)
     found = curve.solve_again(jumped, fixed(jumped.control), old)
     assert (found.kind, found.jump, found.target) == ("jump", jumped.jump, last.target)

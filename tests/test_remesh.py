@@ -39,7 +39,7 @@ def test_remeshing_a_homogeneous_block_changes_no_force(monkeypatch):
     assert path.last.measures["pole_height"] == pytest.approx(-0.3, rel=1e-4)
     for name in ("tool_force", "strain_energy", "travel"):
         assert path.last.measures[name] == pytest.approx(whole[name], rel=5e-4)
-    assert len(path.segments) == 2 and len(path["tool_force"]) == len(path)
+    assert len(path.record.segments) == 2 and len(path["tool_force"]) == len(path)
     freed = path.springback()
     assert freed.path.last.measures["strain_energy"] < 1e-5 and freed.diameter == pytest.approx(2.0, rel=1e-4)
 
@@ -88,7 +88,8 @@ def test_contact_events_are_not_predicted(monkeypatch):
     monkeypatch.setattr(prediction, "MAX_CLOSURES", 0.5)
     assert pressed("stick", 0.1).problem.limit.predicts_events
     path = pressed("stick", 0.5, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
-    assert len(path.segments) > 1 and not any(segment.problem.limit.predicts_events for segment in path.segments)
+    segments = path.record.segments
+    assert len(segments) > 1 and not any(segment.problem.limit.predicts_events for segment in segments)
 
 
 @pytest.mark.thorough
@@ -103,7 +104,7 @@ def test_a_failed_new_mesh_is_not_part_of_the_path(monkeypatch):
     monkeypatch.setattr(remeshing, "_check_mesh", fails)
     with pytest.raises(fx.ConvergenceError) as caught:
         pressed("stick", 0.6, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
-    assert len(caught.value.path.segments) == 1 and caught.value.path.last.measures["travel"] > 0
+    assert len(caught.value.path.record.segments) == 1 and caught.value.path.last.measures["travel"] > 0
 
 
 def test_the_old_mesh_is_kept_while_no_new_one_has_a_state(monkeypatch):
@@ -194,7 +195,7 @@ def test_a_remeshed_run_continues_from_any_state(tmp_path):
     made = [state.kind for state in whole.states].index("remesh")
     for state in (made - 2, made - 1, made):
         part = fx.load(tmp_path / "run", scene, state=state)
-        assert len(part.segments) == 1 + (state >= made)
+        assert len(part.record.segments) == 1 + (state >= made)
         same(fx.trace(scene, until=fx.travel(0.5), remesh=remesh, progress=False, start=part), whole)
     again = fx.trace(scene, until=fx.travel(0.55), remesh=remesh, progress=False, checkpoint=tmp_path / "run",
                      resume=True)
@@ -222,10 +223,10 @@ def test_results_at_material_points_are_continuous_across_meshes(tmp_path):
     assert "remesh" in page
     path.animate(tmp_path / "film.gif", frames=4)
     path.to_stl(tmp_path / "part.stl")
-    ends = [segment.states[-1] for segment in path.segments]
+    ends = [segment.states[-1] for segment in path.record.segments]
     path.to_vtk(tmp_path / "run.pvd", ends)
     steps = steps_of(tmp_path / "run.pvd")
-    for (_, step), entry in zip(steps, path.segments, strict=True):
+    for (_, step), entry in zip(steps, path.record.segments, strict=True):
         assert len(step["points"]) == 6 * entry.problem.forms.domain.topology.index_map(2).size_local
     with pytest.raises(fx.InputError, match="filling: is not available for a remeshed run"):
         path.filling()
@@ -246,7 +247,7 @@ def axial_stress(path, state):
     import basix
 
     from formingx.forms.transfer import in_own_cells
-    problem = path.segment(state).problem
+    problem = path.record.segment(state).problem
     forms = problem.forms
     places, weights = map(np.asarray, basix.make_quadrature(basix.CellType.triangle, problem.scene.quadrature_degree))
     with problem.state_context(state):
@@ -314,7 +315,7 @@ def test_supports_continue_on_new_meshes(monkeypatch):
                       supports=[fx.Symmetry("axis"), fx.Symmetry("bottom", normal="z"),
                                 fx.PrescribedDisplacement("top", "z")])
     whole, path = both(pulled, [fx.travel(0.2), fx.travel(0.5)], 0.3)
-    assert len(path.segments) == 2
+    assert len(path.record.segments) == 2
     for name in ("travel", "support_force", "pole_height", "strain_energy"):
         assert path.last.measures[name] == pytest.approx(whole.last.measures[name], rel=1e-7)
     hinged = fx.Scene(mesh=fx.mesh.disc(radius=2.0, thickness=0.5, elements=(12, 3)),
@@ -342,7 +343,7 @@ def test_constants_and_temperatures_follow_the_material(monkeypatch, tmp_path, h
     run = fx.Process(scene).run
     remesh = fx.Remesh(size=0.18, corner=0.18)
     whole, path = run(stages, progress=False), run(stages, progress=False, remesh=remesh, checkpoint=tmp_path / "run")
-    assert len(path.segments) == 3 - (not heat)
+    assert len(path.record.segments) == 3 - (not heat)
     points = [(0.6, 0.4), (1.1, 0.7), (1.45, 0.2)]
     assert path.temperature(points) == pytest.approx(whole.temperature(points), abs=0.1)
     for name in ("strain_energy", "enclosed_volume"):
@@ -427,7 +428,7 @@ def test_mean_stress_is_conserved_by_the_transfer(monkeypatch):
         return fem.assemble_scalar(fem.form(value))
     for travel, n, force, energy in ((0.2, 8, 5e-3, 4e-3), (0.5, 8, 4e-3, 2e-3)):
         path, state = remeshed_at(monkeypatch, travel, n)
-        old, new = path.segments[0], path.segments[1].problem
+        old, new = path.record.segments[0], path.record.segments[1].problem
         with old.problem.state_context(old.states[-1]):
             before = mean(old.problem.forms)
         new.x.array_w[:] = new.scene.state_transfer.unknowns(new)
@@ -439,7 +440,7 @@ def test_mean_stress_is_conserved_by_the_transfer(monkeypatch):
 def test_the_node_on_the_axis_stays_with_those_beside_it():
     """Its share of the area is no measure of the pressure: what touches there carries no friction, and no dimple."""
     path = pressed("stick", 0.55, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
-    made = next(s for s in path.segments[1:])
+    made = next(s for s in path.record.segments[1:])
     contact, state = made.problem.contacts[0], made.states[0]
     near = np.argsort(contact.points[:, 0])[:5]
     with made.problem.state_context(state):

@@ -380,7 +380,7 @@ def test_branch_points_are_those_that_a_run_warns_of(caplog):
     found = path.branch_points
     assert len(found) == 3 and len(said) == 3
     for (before, behind), words in zip(found, said):
-        assert f"between {path.describe(before)} and {path.describe(behind)}" in words
+        assert f"between {path.record.describe(before)} and {path.record.describe(behind)}" in words
         assert 1.0 < before.measures["pressure"] / zoelly < behind.measures["pressure"] / zoelly < 1.4
     back = fx.trace(scene, start=path, until=fx.pole_height(0.0), step=step, progress=False)
     assert len(back.branch_points) == 6 and len(back.states) > len(path.states)
@@ -396,7 +396,7 @@ def test_imperfections_reduce_the_limit_load(caplog):
     loss = path.stability([0]).first
     (before, behind), = path.branch_points
     assert before is loss.left and behind is loss.right
-    assert len(said) == 1 and path.describe(before) in said[0] and said[0] in str(fx.check(path))
+    assert len(said) == 1 and path.record.describe(before) in said[0] and said[0] in str(fx.check(path))
     bent = fx.with_imperfection(mesh, loss, 1e-2)
     assert np.abs(bent.nodes_of("inner")[:, 0] - 0.8).max() == pytest.approx(
         1e-2 * np.abs(loss.amplitudes[loss.points[:, 0] < 0.8 + 1e-9, 0]).max(), rel=1e-6)

@@ -13,7 +13,7 @@ def inadmissible(path: Any) -> Iterator[Finding]:
     """Report the first inadmissible state of a `Path`: no real body can have it (`State.inadmissible_reason`)."""
     bad = next((state for state in path.states if state.inadmissible_reason), None)
     if bad is not None:
-        yield Finding("serious", "state", f"from {path.describe(bad)} on the results must not be used:"
+        yield Finding("serious", "state", f"from {path.record.describe(bad)} on the results must not be used:"
                                           f" {bad.inadmissible_reason}")
 
 
@@ -34,11 +34,11 @@ def contact(path: Any) -> Iterator[Finding]:
     points.
     """
     moved = resticking.furthest(path)
-    yield from path.admissibility.findings(path.last)
+    yield from path._view(path.record.segments[-1]).admissibility.findings(path.last)
     yield from edges.findings(edges.coarsest(path, path.last))
     yield from resticking.findings(moved)
     if moved and moved.shift > resticking.LARGE_SHIFT:
-        yield from peeling.findings(peeling.strongest(path.problem, path.segments[-1].states))
+        yield from peeling.findings(peeling.strongest(path.problem, path.record.segments[-1].states))
     yield from creases.findings(creases.deepest(path))
 
 

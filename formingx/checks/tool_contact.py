@@ -21,9 +21,9 @@ def untouched(path: Any) -> Iterator[Finding]:
 
     A remeshed run has no findings.
     """
-    segment = path.segments[-1]
+    segment = path.record.segments[-1]
     problem, states = segment.problem, segment.states
-    if len(path.segments) > 1 or len(states) < 2:            # after remeshing the earlier states are missing
+    if len(path.record.segments) > 1 or len(states) < 2:            # after remeshing the earlier states are missing
         return
     mould_contacts = moulds(problem.scene)
     names = Tooling.of_problem(problem).names

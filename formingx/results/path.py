@@ -30,7 +30,7 @@ from .evaluate.admissibility import AdmissibilityCheck
 from .evaluate.dissipation import dissipated_energy
 from .evaluate.profile import Profile, Profiles, whole_part
 from .evaluate.stress import Stresses, StressField
-from .reader import Reader, SectionReader
+from .reader import Reader, SectionReader, section_only
 from .show.picture import Picture
 
 _ROUNDING_ERROR = 0.5 * 10.0 ** (1 - 6)
@@ -91,11 +91,6 @@ class Path:
         record.judge = lambda state: self._view(record.segments[-1]).admissibility.reason(state)
 
     @property
-    def segments(self) -> list[Segment]:
-        """Segments of the run in order, each with the problem on one mesh and its states; one without remeshing."""
-        return self.record.segments
-
-    @property
     def states(self) -> list[State]:
         """All accepted states, in order along the path."""
         return self.record.states
@@ -151,7 +146,7 @@ class Path:
         section (axisymmetric, n = 0) and only an odd number of them are found; `Path.stability` finds all. The list is
         empty for materials with history variables.
         """
-        return [pair for segment in self.segments for pair in branch_points(segment.curve, segment.states)]
+        return [pair for segment in self.record.segments for pair in branch_points(segment.curve, segment.states)]
 
     @property
     def jumps(self) -> list[State]:
@@ -186,7 +181,7 @@ class Path:
         Raises:
             InputError: there is no such column.
         """
-        segment = self.segment(state)
+        segment = self.record.segment(state)
         if isinstance(measure, str):
             self._check(measure)
             measure = self._view(segment).columns[measure]
@@ -242,7 +237,7 @@ class Path:
         refused: list[InputError] = []
         piece: tuple[Segment, State, State, Quantity] | None = None
         started = after is None
-        for segment in self.segments:
+        for segment in self.record.segments:
             for left, right in zip(segment.states, segment.states[1:]):
                 started = started or left is after
                 if not started or left.setting != right.setting:
@@ -316,33 +311,6 @@ class Path:
             self._fill(segment, record.states[:k])
         return record.last
 
-    def interpolate(self, a: State, b: State, fraction: float) -> State:
-        """Return a state interpolated between two successive states, for drawing; it is not in equilibrium.
-
-        Unknowns and control follow the cubic through both states and their tangents; the rest is copied from `b`. If
-        `b` begins another stage, it is returned unchanged.
-
-        Args:
-            a: a state of the path.
-            b: the next state.
-            fraction: position between them, 0 at `a`, 1 at `b`.
-        """
-        if a.setting != b.setting:                           # a stage begins
-            return b
-        x, control = self.segment(b).curve.interpolate(a, b, fraction)
-        return replace(b, x=x, control=control)
-
-    def distance(self, a: State, b: State) -> float:
-        """Return the distance from a state to the next one in the metric of arc length, dimensionless.
-
-        The difference of both states is projected on the tangent of the path. Between two stages the distance is 0.
-
-        Args:
-            a: a state of the path.
-            b: the next state.
-        """
-        return self.segment(b).curve.progress(a, b) if a.setting == b.setting else 0.0
-
     def curve(self, *columns: str, points: int = 12) -> list[np.ndarray]:
         """Return the values of columns at m points along a smooth curve through the states, for drawing.
 
@@ -361,7 +329,7 @@ class Path:
         """
         self._check(*columns)
         rows = []
-        for segment in self.segments:
+        for segment in self.record.segments:
             for states in _pieces(segment.states):
                 rows.append([states[0].measures[c] for c in columns])
                 rows += self._smooth(segment, states, columns, points) if len(states) > 1 else []
@@ -391,10 +359,6 @@ class Path:
                 rows.append([b.measures[c] for c in columns])
         return rows
 
-    def describe(self, state: State) -> str:
-        """Return the main numbers of a state as one line of text."""
-        return self.record.describe(state)
-
     def __repr__(self) -> str:
         return f"Path({len(self.states)} states{f', to {self.last!r}' if self.states else ''})"
 
@@ -422,7 +386,7 @@ class Path:
             InputError: the mesh has no two faces of a sheet, or the sheet is in three dimensions.
         """
         state = state or self.last
-        return self._view(self.segment(state)).profiles.evaluate(state)
+        return self._view(self.record.segment(state)).profiles.evaluate(state)
 
     def stress(self, state: State | None = None) -> StressField:
         """Return the stresses and stretches of a solid body, layer by layer; collective.
@@ -436,9 +400,9 @@ class Path:
         Raises:
             InputError: the body is a membrane, or a sheet in three dimensions.
         """
-        self.section_only("stress", "look at path.wall(): stretches")
+        section_only(self.scene, "stress", "look at path.wall(): stretches")
         state = state or self.last
-        return self._view(self.segment(state)).stresses.evaluate(state)
+        return self._view(self.record.segment(state)).stresses.evaluate(state)
 
     def to_csv(self, file: Any, units: Units | None = None) -> None:
         """Write a CSV file with one row per state (rank 0 writes).
@@ -513,7 +477,7 @@ class Path:
                 is not positive, the body is not a sheet in a section, or the path has one state only.
         """
         from .show import animation
-        self.section_only("animate", "use report, or view3d for each state")
+        section_only(self.scene, "animate", "use report, or view3d for each state")
         animation.animate(self, file, frames, seconds, units or NONE)
         return Picture(file)
 
@@ -661,9 +625,9 @@ class Path:
         Raises:
             InputError: there is no such tool, or the body is a sheet in three dimensions.
         """
-        self.section_only("contact", "use tool_forces(), or filling()")
+        section_only(self.scene, "contact", "use tool_forces(), or filling()")
         from .evaluate.contact_face import ContactFace, contact_of
-        on_mesh = self.same_mesh(state or self.last)
+        on_mesh = self._same_mesh(state or self.last)
         return ContactFace(on_mesh, contact_of(on_mesh, tool, "contact")[0]).evaluate(state or self.last)
 
     def temperature(self, points: ArrayLike, state: State | None = None, *,
@@ -694,7 +658,7 @@ class Path:
                                        and np.all((depths >= 0) & (depths <= 1))):
             raise InputError(f"Path.temperature: depth = {depth!r}: must be numbers from 0 to 1, one or one for each"
                              f" point, of a sheet in three dimensions")
-        with self.segment(state).problem.state_context(state) as problem:
+        with self.record.segment(state).problem.state_context(state) as problem:
             return problem.temperature.at_points(problem.followed(at), depths)
 
     def tool_forces(self) -> dict[str, np.ndarray]:
@@ -735,7 +699,7 @@ class Path:
         Raises:
             InputError: the body is a sheet in three dimensions, or its material is of K-BKZ type.
         """
-        self.section_only("work")
+        section_only(self.scene, "work")
         from .evaluate.work import work
         return work(self)
 
@@ -770,7 +734,7 @@ class Path:
             OSError: the file cannot be written.
         """
         from .files.shells import to_inp
-        self.section_only("to_inp", "use shell_model")
+        section_only(self.scene, "to_inp", "use shell_model")
         if not self.problem.scene.kinematics.axisymmetric or count("to_inp: parts", parts) < 3:
             raise InputError(f"to_inp: parts = {parts!r}: must be at least 3, of an axisymmetric body")
         to_inp(whole_part(self.profile(state), self.scene.symmetry), parts, file, self.problem.comm)
@@ -790,20 +754,6 @@ class Path:
         from .files.solid import to_gltf
         to_gltf(self._reader.solid(state or self.last), file, self.problem.comm, units or NONE)
 
-    def section_only(self, what: str, instead: str = "") -> None:
-        """Raise an error for a method that does not exist in three dimensions.
-
-        Args:
-            what: name of the method.
-            instead: advice for the message.
-
-        Raises:
-            InputError: the body is a sheet in three dimensions.
-        """
-        if self.scene.kinematics.components == 3:
-            raise InputError(f"{what}: is not available yet for a sheet in three dimensions"
-                             + (f": {instead}" if instead else ""))
-
     @cached_property
     def _reader(self) -> Reader:
         """Object that evaluates walls, parts, pictures and reports for the kinematics of the scene."""
@@ -817,7 +767,7 @@ class Path:
 
     def _measure(self, state: State) -> None:
         """Compute `State.measures` of a newly accepted state; the run calls this function (`RunHooks.on_state`)."""
-        segment = self.segments[-1]
+        segment = self.record.segments[-1]
         self._fill(segment, self.states if len(segment.states) == 1 else segment.states)
 
     def _fill(self, segment: Segment, states: list[State]) -> None:
@@ -835,25 +785,14 @@ class Path:
         with segment.problem.state_context(state) as problem:
             return {name: bound.value(problem.x, state.control) for name, bound in columns.items()}
 
-    def segment(self, state: State | None = None) -> Segment:
-        """Return the segment of the run with the mesh of a state; default the mesh of the last state."""
-        mesh = (state or self.last).setting.get("mesh", 0)
-        return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
-                    self.segments[-1])
-
-    def same_mesh(self, state: State) -> Any:
+    def _same_mesh(self, state: State) -> Any:
         """Return a path of the states on the mesh of a given state; this path itself if the run has one mesh."""
-        if len(self.segments) == 1:
+        if len(self.record.segments) == 1:
             return self
-        segment = self.segment(state)
+        segment = self.record.segment(state)
         record = Record(segment.problem, segment.curve)
         record.segments, record.counts = [segment], self.counts
         return type(self)(record, self._timed, self._columns, self)
-
-    @property
-    def admissibility(self) -> AdmissibilityCheck:
-        """Object that checks whether states on the last mesh are admissible."""
-        return self._view(self.segments[-1]).admissibility
 
     def _view(self, segment: Segment) -> _View:
         """Return the objects that evaluate columns, profiles, stresses and admissibility of the states of a segment."""

@@ -97,9 +97,9 @@ class SectionReader:
 
     def filling(self, contact: FaceContact) -> Filling:
         """Return the gaps in the corners of a tool (`Path.filling`); InputError for several meshes or no corner."""
-        if len(self._path.segments) > 1:
+        if len(self._path.record.segments) > 1:
             raise InputError("filling: is not available for a remeshed run as a whole: evaluate the states of one"
-                             " mesh, path.same_mesh(state).filling()")
+                             " mesh by path.wall(state) or path.contact(state=state)")
         from .evaluate.filling import filling
         return filling(self._path, contact)
 
@@ -123,3 +123,10 @@ class SectionReader:
         from .show import report
         return report.write(report.of_path(self._path), file, title, failure, self._path.problem.comm, units, density,
                             trim)
+
+
+def section_only(scene: Any, what: str, instead: str = "") -> None:
+    """Raise an `InputError` for the method `what` of a sheet in three dimensions, with the advice `instead`."""
+    if scene.kinematics.components == 3:
+        raise InputError(f"{what}: is not available yet for a sheet in three dimensions"
+                         + (f": {instead}" if instead else ""))

@@ -131,6 +131,12 @@ class Record:
         """Last accepted state of the run."""
         return self.segments[-1].states[-1]
 
+    def segment(self, state: State | None = None) -> Segment:
+        """Return the segment of the run with the mesh of a state; default the mesh of the last state."""
+        mesh = (state or self.last).setting.get("mesh", 0)
+        return next((s for s in self.segments if s.states and s.states[0].setting.get("mesh", 0) == mesh),
+                    self.segments[-1])
+
     def restore(self) -> int:
         """Restore the last accepted state in the problem; return the number of last states with its step data.
 

@@ -8,8 +8,7 @@ import numpy as np
 
 from ...errors import InputError, positive
 from ...forms.outline import FINE_PIECES, Outline, edge_points
-from ...results.extend import method_of
-from ...results.path import Path
+from ...results.reader import section_only
 from ...values.tolerances import EXAMINED_STATES
 
 _FILLET_GAP = 0.25
@@ -22,7 +21,6 @@ _STRESS_ORDER = 2
 """Order of the stress error."""
 
 
-@method_of(Path)
 def column_factors(path: Any, max_rotation: float | None, error: float | None) -> np.ndarray:
     """Return the factors by which the n columns of a mesh should become longer (below 1: shorter).
 
@@ -42,7 +40,7 @@ def column_factors(path: Any, max_rotation: float | None, error: float | None) -
     Raises:
         InputError: a sheet in three dimensions, a mesh without columns, or a limit that is not above 0.
     """
-    path.section_only("column_factors", "use fx.mesh.adapted")
+    section_only(path.scene, "column_factors", "use fx.mesh.adapted")
     max_rotation, error = (value if value is None else positive(f"column_factors: {name}", value)
                     for name, value in (("max_rotation", max_rotation), ("error", error)))
     columns = path.problem.scene.mesh.columns

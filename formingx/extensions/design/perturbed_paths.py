@@ -44,7 +44,7 @@ class _PerturbedPaths:
     """
 
     def __init__(self, path: Path, end: Any, perturbed: Sequence[PerturbedRun]):
-        if len(path.segments) > 1:
+        if len(path.record.segments) > 1:
             raise Failure("the body was remeshed", [])
         if path.ended:
             raise Failure(path.ended, [])
@@ -70,8 +70,8 @@ class _PerturbedPaths:
         history = self.problem.has_history
         if history and any(state.kind == "jump" for state in states):
             jump = next(state for state in states if state.kind == "jump")
-            raise Failure(f"the body snaps at {self.path.describe(jump)}, where the result does not depend smoothly on"
-                          " parameters", [])
+            raise Failure(f"the body snaps at {self.path.record.describe(jump)}, where the result does not depend"
+                          " smoothly on parameters", [])
         if history and any(p.prescribes_quantity for p in self._plans):
             raise Failure("there is none yet for a stage that follows or holds a measure (amplitudes={measure: ...},"
                           " constant=...) in a scene with friction, relaxation or heat", [])

@@ -198,7 +198,7 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
     Constants about which a check warned before the run are left out.
     """
     reported = {finding.about for finding in path.record.findings}
-    states = path.segments[-1].states
+    states = path.record.segments[-1].states
     for k, history in enumerate(path.problem.histories):
         if isinstance(history, CoolingHistory):
             limits = path.problem.temperature.limits             # elements overshoot next to a chilled face
@@ -238,4 +238,4 @@ def temperature_errors(path: Any) -> Iterator[Finding]:
     """Yield a warning if the mesh is too coarse for the temperature, in states on the last mesh; collective."""
     for history in path.problem.histories:
         if isinstance(history, CoolingHistory):
-            yield from history.findings(path.segments[-1].states)
+            yield from history.findings(path.record.segments[-1].states)

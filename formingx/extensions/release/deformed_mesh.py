@@ -16,6 +16,7 @@ from ...mesh.mesh import Mesh
 from ...mesh.nodes import own_cells
 from ...results.extend import method_of
 from ...results.path import Path
+from ...results.reader import section_only
 from ...solve.state import State
 
 _NODES = np.array([[0, 0], [1, 0], [0, 1], [0.5, 0.5], [0, 0.5], [0.5, 0]])
@@ -43,9 +44,9 @@ def deformed_mesh(path: Path, state: State | None = None, *, size: float | None 
         InputError: a membrane, a sheet in three dimensions, or deformed elements that are inverted or overlap. Also new
             elements of several layers, on several ranks, or around a hole.
     """
-    path.section_only("deformed_mesh", "use to_stl, or shell_model")
+    section_only(path.scene, "deformed_mesh", "use to_stl, or shell_model")
     state = state or path.last
-    problem = path.segment(state).problem
+    problem = path.record.segment(state).problem
     forms, mesh = problem.forms, problem.scene.mesh
     domain, comm = mesh.domain, mesh.comm
     if forms.domain is not domain:

@@ -19,6 +19,7 @@ from ...results.evaluate.wall import Wall
 from ...results.extend import method_of
 from ...results.numbers import KeyNumbers
 from ...results.path import Path
+from ...results.reader import section_only
 from ...scene.scene import Scene
 from ...solve.arc_length import Curve
 from ...solve.newton import Tolerances
@@ -142,9 +143,9 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
         InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
         ConvergenceError: no state of the free part was found; it carries the path so far.
     """
-    path.section_only("springback")
+    section_only(path.scene, "springback")
     state = state or path.last
-    source = path.segment(state).problem
+    source = path.record.segment(state).problem
     mesh, trimmed = source.scene.mesh, float(path.wall(state).r[-1])
     if source.forms.domain is not mesh.domain:
         raise InputError("Path.springback: a membrane has no bending stiffness to keep a shape: form a solid,"

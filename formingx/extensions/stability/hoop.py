@@ -14,6 +14,7 @@ from ...results.evaluate.wall import between_layers
 from ...results.extend import method_of
 from ...results.files.column_table import ColumnTable
 from ...results.path import Path
+from ...results.reader import section_only
 
 
 @dataclass(frozen=True, repr=False)
@@ -69,9 +70,9 @@ def hoop_resultants(path: Path, state: Any = None) -> HoopResultants:
     Raises:
         InputError: plane strain, a sheet in three dimensions, or a mesh that is no sheet.
     """
-    path.section_only("hoop_resultants", "use path.wall().wrinkled")
+    section_only(path.scene, "hoop_resultants", "use path.wall().wrinkled")
     state = state or path.last
-    problem = path.segment(state).problem
+    problem = path.record.segment(state).problem
     scene = problem.scene
     if not scene.kinematics.axisymmetric:
         raise InputError("hoop_resultants: in plane strain nothing goes round an axis")

@@ -14,6 +14,7 @@ from ...mesh.nodes import without_round_off
 from ...ranks import gathered
 from ...results.extend import method_of
 from ...results.path import Path
+from ...results.reader import section_only
 from ...results.show.picture import Picture
 from ...run_hooks import RunExtension
 from ...solve.record import Record
@@ -94,7 +95,7 @@ class CriticalPoint:
             why = "is a limit point, through which the path itself goes on" if self.limit_point else (
                 "varies round the body, or is antisymmetric about a mirror plane: its branch leaves this scene")
             raise InputError(f"CriticalPoint.branch: the mode {why}; branches of n = 0 can be followed")
-        segment = self.path.segment(self.left)
+        segment = self.path.record.segment(self.left)
         curve, problem = segment.curve, segment.problem
         start = State(self.state.x.copy(), self.state.control, self.located.x, 0.0, kind="branch point",
                       history_variables=self.left.history_variables, stage=self.left.stage,
@@ -174,7 +175,7 @@ class Stability:
         name, unit = problem.shown(0.0)[0], "n" if problem.scene.kinematics.axisymmetric else "k"
         head = (f"stability: {unit} = {', '.join(f'{n:g}' for n in self.numbers)}, {len(self.states)} states; elastic,"
                 f" at fixed {name}")
-        if any(entry.relaxes for entry in (s.problem for s in self.path.segments)):
+        if any(entry.relaxes for entry in (s.problem for s in self.path.record.segments)):
             head += "; relaxing materials with their stiffness of the instant"
         unstable = [f"{unit} = {n:g}" for (n, _), found in self.counts.items() if found[0]]
         lines = [head, *([f"  unstable from the first state on: {', '.join(unstable)}"] if unstable else [])]
@@ -223,10 +224,10 @@ class StabilityAnalysis:
             """Return the number of unstable modes in a state, computed once."""
             key = id(state), kind
             if key not in counted:
-                counted[key] = self.modes_of(self._path.segment(state)).count(state, kind)
+                counted[key] = self.modes_of(self._path.record.segment(state)).count(state, kind)
             return counted[key]
         kinds = [ModeClass(n, plane) for n in numbers
-                 for plane in (None, *self.modes_of(self._path.segments[-1]).variation.mirrors)]
+                 for plane in (None, *self.modes_of(self._path.record.segments[-1]).variation.mirrors)]
         for kind in kinds:
             counts[kind] = [unstable_modes(state, kind) for state in chosen]
             for a, b in zip(chosen, chosen[1:]):
@@ -243,7 +244,7 @@ class StabilityAnalysis:
         """
         if unstable_modes(a, kind) == unstable_modes(b, kind):
             return []
-        segment = self._path.segment(a)
+        segment = self._path.record.segment(a)
         states = [s for s in segment.states if s.kind != "limit point" or kind.number]
         if b not in states or a not in states:
             return []
@@ -307,7 +308,7 @@ def stability(path: Path, modes: Any = range(9), states: Any = 20) -> Stability:
     Raises:
         InputError: a membrane, an elastic support, or a load without a second variation.
     """
-    path.section_only("stability")
+    section_only(path.scene, "stability")
     analysis = vars(path).setdefault("_stability_analysis", StabilityAnalysis(path))        # keeps its matrices
     return analysis.examine(modes, states)
 
@@ -336,13 +337,13 @@ class InstabilityCondition(RunExtension):
         def examine() -> None:
             """End the run if the last state has more unstable modes of a wave number than the first state."""
             state = path.last
-            modes = analysis.modes_of(path.segment(state))
+            modes = analysis.modes_of(path.record.segment(state))
             for kind in (ModeClass(n, plane) for n in numbers for plane in (None, *modes.variation.mirrors)):
                 unstable = modes.count(state, kind)
                 if not (kind.number or kind.antisymmetric_about):
                     unstable -= state.slope * path.states[0].slope < 0      # a limit point is expected
                 if unstable > first.setdefault(kind, unstable):
-                    path.record.ended = (f"{kind.number:g} waves become unstable before {path.describe(state)}:"
+                    path.record.ended = (f"{kind.number:g} waves become unstable before {path.record.describe(state)}:"
                                          f" path.stability(modes=[{kind.number:g}]) finds where")
                     return
         path.record.hooks.on_step.append(examine)

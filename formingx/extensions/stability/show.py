@@ -27,7 +27,7 @@ def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     The axis of an axisymmetric body is left out.
     """
     path, state = point.path, point.state
-    segment = path.segment(point.left)
+    segment = path.record.segment(point.left)
     mesh = segment.problem.scene.mesh
     from ...forms.probes import probe
     lines = []

@@ -45,7 +45,7 @@ def furthest(path: Any) -> Resticking | None:
         definition = contact.contact
         if definition.lagged or not (definition.sticks and definition.separates):
             continue
-        touches = [state.history_variables[number].history for state in path.segments[-1].states
+        touches = [state.history_variables[number].history for state in path.record.segments[-1].states
                    if state.kind != "start"                 # points that touch there do not stick: they carry no force
                    and len(state.history_variables) > number and state.history_variables[number] is not None]
         rows = gathered(contact.comm, np.column_stack([contact.points, _shifts(contact, touches)]))

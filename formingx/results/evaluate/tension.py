@@ -100,7 +100,7 @@ def first_compression(path: Any) -> tuple[int, Resultant] | None:
     The smallest resultant is meant; None without compression or without a membrane. Collective.
     """
     k = 0
-    for segment in path.segments:
+    for segment in path.record.segments:
         scene = segment.problem.scene
         line = isinstance(scene.model, Membrane) and scene.kinematics.components == 2
         tension = Tension(segment.problem) if line else None

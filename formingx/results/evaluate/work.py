@@ -366,17 +366,17 @@ def balance(path: Any) -> dict[str, np.ndarray]:
     """
     if "strain_energy" not in path.columns:
         raise InputError("Path.work: is not available with K-BKZ: its stored energy is no function of its state")
-    balances = [EnergyBalance(segment).rows() for segment in path.segments]
+    balances = [EnergyBalance(segment).rows() for segment in path.record.segments]
     names = dict.fromkeys(name for rows in balances for name in rows)
-    empty = [np.zeros(len(segment.states)) for segment in path.segments]
+    empty = [np.zeros(len(segment.states)) for segment in path.record.segments]
     found = {name: np.cumsum(np.concatenate([rows.get(name, zero) for rows, zero in zip(balances, empty)]))
              for name in names}
     lost: dict[str, np.ndarray] = {name: found.pop(name) for name in _LOSSES if name in found}
     lost |= {name: path[name] for name in _MATERIAL_LOSSES if name in path.columns}
     stored = path["strain_energy"] - path["strain_energy"][0]
     zero = np.zeros(len(path))
-    if len(path.segments) > 1:
-        first = np.cumsum([len(segment.states) for segment in path.segments])[:-1]
+    if len(path.record.segments) > 1:
+        first = np.cumsum([len(segment.states) for segment in path.record.segments])[:-1]
         made = zero.copy()
         made[first] = stored[first] - stored[first - 1]
         found["new_meshes"] = np.cumsum(made)

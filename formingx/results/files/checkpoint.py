@@ -94,7 +94,7 @@ class Checkpoint:
         States of an unfinished last step are removed. Another run or other files are an InputError, failed writing an
         OSError.
         """
-        problem, folder, path = self._path.segments[0].problem, self.folder, self._path
+        problem, folder, path = self._path.record.segments[0].problem, self.folder, self._path
         scene = describe(problem)
         about = {"formingx": FORMAT, "versions": files.versions(), "scene": scene, "summary": summary(problem.scene)}
 
@@ -125,7 +125,7 @@ class Checkpoint:
 
         A state that exists or cannot be written raises an OSError.
         """
-        segment = self._path.segment(state)
+        segment = self._path.record.segment(state)
         problem = segment.problem
         final = self.folder / state_name(number)
         part = final.with_name(final.name + ".part")
@@ -133,7 +133,7 @@ class Checkpoint:
                      for history, values in zip(problem.histories, state.history_variables, strict=True)]
         space = problem.forms.space
         data = _plain_state(state) | {"number": number, "memory": variables, "profile": _profile(self._path, state)}
-        if state is segment.states[0] and segment is not self._path.segments[0]:
+        if state is segment.states[0] and segment is not self._path.record.segments[0]:
             data["mesh"] = problem.scene.state_transfer.save(problem)
         for name in FIELDS:
             data |= {name: _by_cell(space, getattr(state, name)), f"{name}_tail": _tail(space, getattr(state, name))}

@@ -137,9 +137,9 @@ def to_vtk(path: Any, file: Any, states: Any = None) -> None:
         files.replace(target, lambda stream: stream.write(text))
 
     for number, state in _chosen(path, states):
-        key = id(path.segment(state).problem)
+        key = id(path.record.segment(state).problem)
         if key not in meshes:
-            fields = Fields(path.same_mesh(state))
+            fields = Fields(path._same_mesh(state))
             meshes[key] = fields, _gather(fields.points, comm)
         fields, points = meshes[key]
         values = {name: _gather(v, comm) for name, v in fields.evaluate(state).items()}

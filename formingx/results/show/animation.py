@@ -5,6 +5,7 @@ The loading curve of a stage is, for example, the force of a plug over its trave
 
 import shutil
 import subprocess
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,15 @@ from ...units import NONE, Units
 from .. import files
 from . import plots
 from .report_data import progress
+
+
+def _between(record: Any, a: Any, b: Any, fraction: float) -> Any:
+    """Return the state at a fraction from a state to the next, on the cubic through both; it is not in equilibrium.
+    If `b` begins another stage, it is `b`."""
+    if a.setting != b.setting:
+        return b
+    x, control = record.segment(b).curve.interpolate(a, b, fraction)
+    return replace(b, x=x, control=control)
 
 
 def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NONE) -> None:
@@ -33,7 +43,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
         raise InputError(f"animate: the path has {len(path)} states: nothing moves")
     shapes, tools, now, tooling, shown = [], [], [], Tooling.of_problem(path.problem), columns_of_stages(path)
     for a, b, fraction in spread(path, frames):
-        interpolated = path.interpolate(a, b, fraction)
+        interpolated = _between(path.record, a, b, fraction)
         shapes.append(path.profile(interpolated))
         names = shown[b.stage]
         now.append((names, [a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in names]))

@@ -261,10 +261,10 @@ def _fields_of(path: Any, drawn: Any, last: Profile, done: Callable[[float], Any
     drawn: numbers of the drawn states. last: profile in the last state. done: called with the fraction that is done.
     """
     found: list[dict[str, np.ndarray]] = [{} for _ in path.states]
-    fields = {id(entry): _Fields(path.same_mesh(entry.states[0]), last) for entry in path.segments}
+    fields = {id(entry): _Fields(path._same_mesh(entry.states[0]), last) for entry in path.record.segments}
     for i, k in enumerate(drawn):
         done(i / len(drawn))
-        found[k] = fields[id(path.segment(path.states[k]))].evaluate(path.states[k])
+        found[k] = fields[id(path.record.segment(path.states[k]))].evaluate(path.states[k])
     return found
 
 
