@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from conftest import run_json
 from test_demos import summary
-from test_space import trough
+from test_space import on_ball, trough
 
 import formingx as fx
 from formingx.physics.contact_law import ContactStatus
@@ -130,6 +130,13 @@ def test_capstan(mu):
     slope = np.polyfit(angle[on], np.log(force[on]), 1, w=np.sqrt(wall.area[on]))[0]
     assert slope == pytest.approx(mu, rel=5e-3)
     assert path.counts.iterations < 450
+
+
+def test_a_ball_is_pushed_against_a_pressure():
+    """Newton's method converges quadratically though the normals of the ball move with it."""
+    scene = on_ball("none", pressure=0.046)
+    path = fx.trace(scene, until=fx.travel(0.5), progress=False)
+    assert path.counts.steps < 20 and path.counts.iterations < 4.5 * path.counts.steps
 
 
 def test_force_of_a_rough_ball(rough_ball):

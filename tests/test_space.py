@@ -477,11 +477,11 @@ def tray(friction, **more):
         fx.Pressure("top")], contacts=[fx.Contact("bottom", tool, friction, name="mould", **more)])
 
 
-def on_ball(friction):
+def on_ball(friction, pressure=0.02):
     """Return the scene of a quarter of a disc that a pressure holds on a ball which is pushed into it."""
     sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=0.1)
     return fx.Scene(mesh=sheet, thickness=0.01, materials=fx.NeoHookean(c10=1.0), supports=HELD, loads=[
-        fx.Pressure("bottom", value=0.02)], contacts=[fx.Contact("top", fx.tools.revolved(
+        fx.Pressure("bottom", value=pressure)], contacts=[fx.Contact("top", fx.tools.revolved(
             fx.tools.sphere(radius=0.5, z=0.0)), friction, direction=(0, 0, -1), name="mould")])
 
 

@@ -42,10 +42,10 @@ class PressureOnTools:
 
     The forms contain the normal n of the tool to first order in the displacement u,
 
-    .. math:: n(u) = n(u_0) + H (u - u_0)
+    .. math:: n(u, c) = n(u_0, c_0) + H (u - u_0 - (c - c_0) \, w)
 
-    with the present displacement u_0 and the Hessian H of the distance from the tool. The tangent of the forms is
-    therefore exact at u_0.
+    with the present displacement u_0 and control c_0, the Hessian H of the distance from the tool, and the motion w of
+    the tool by the control. The derivatives of the forms are therefore exact at (u_0, c_0).
 
     Args:
         surface: forms of the sheet, a `Surface`.
@@ -54,19 +54,23 @@ class PressureOnTools:
     def __init__(self, surface: Any):
         self._surface = surface
         self._works: list[Any] = []
-        self._displacement, self._normal, *self._hessian = (fem.Function(surface.space) for _ in range(5))
+        self._displacement, self._normal, self._motion, *self._hessian = (
+            fem.Function(surface.space) for _ in range(6))
+        self._at = surface.constant(0.0)                     # control to which the coefficients belong
         self._pressed = fem.Function(surface.space)          # contact pressure of one tool at each node
         self._least = fem.Function(fem.functionspace(surface.domain, ("Discontinuous Lagrange", 0)))
         self._holder: np.ndarray = np.zeros(0, dtype=int)    # number of the face that touches each owned unknown, or -1
 
-    def work(self, value: Any, area: Any) -> Any:
+    def work(self, value: Any, area: Any, control: Any) -> Any:
         """Return the virtual work (UFL) that a pressure does in excess of p a n/3, to subtract from the residual.
 
-        value: pressure (UFL). area: deformed area vector per unit reference area (UFL, shape (3,)).
+        value: pressure (UFL). area: deformed area vector per unit reference area (UFL, shape (3,)). control: UFL.
         """
         surface, v = self._surface, self._surface.test_displacement()
-        displacement, normal, *hessian = (ufl.split(f)[0] for f in (self._displacement, self._normal, *self._hessian))
-        n = normal + sum(h * (u - a) for h, u, a in zip(hessian, surface.u, displacement))
+        displacement, normal, motion, *hessian = (ufl.split(f)[0] for f in (
+            self._displacement, self._normal, self._motion, *self._hessian))
+        further = surface.u - displacement - (control - self._at) * motion
+        n = normal + sum(h * further[i] for i, h in enumerate(hessian))
         full = _FULL * abs(value)
         share = ufl.conditional(ufl.lt(self._least, full), self._least / full, ufl.conditional(
             ufl.gt(self._least, 0), 1, 0))
@@ -81,12 +85,13 @@ class PressureOnTools:
     def refresh(self) -> None:
         """Update the coefficients of the virtual work to the present displacement of the sheet; collective.
 
-        The coefficients are the normals of the tools at the nodes in contact, their derivatives, and the least contact
-        pressure of the nodes of each triangle. The pressures belong to the last accepted state.
+        The coefficients are the normals of the tools at the nodes in contact, their derivatives, the motions of these
+        tools by the control, and the least contact pressure of the nodes of each triangle. The pressures belong to the last accepted state.
         """
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)
-        functions = (self._normal, *self._hessian)
+        functions = (self._motion, self._normal, *self._hessian)
+        self._at.value = control
         for function in (*functions, self._least):
             function.x.array[:] = 0
         largest, self._holder = np.zeros(len(surface.w.x.array)), np.full(len(surface.w.x.array), -1)
@@ -103,7 +108,9 @@ class PressureOnTools:
                 first = pressure >= largest[dofs[:, 0]]      # of several tools, the one that presses most
                 largest[dofs[first, 0]] = pressure[first]
                 self._holder[dofs[first]] = k
-                for function, values in zip(functions, (distances.normal, *distances.hessian.transpose(2, 0, 1))):
+                motion = np.broadcast_to(face.tool_displacement(1.0) - face.tool_displacement(0.0), dofs.shape)
+                for function, values in zip(functions, (motion, distances.normal,
+                                                        *distances.hessian.transpose(2, 0, 1))):
                     function.x.array[dofs[first]] = values[first]
         for function in functions:
             function.x.scatter_forward()

@@ -80,10 +80,11 @@ class Surface(Formulation):
             face = body.face(load.on, load.quadrature_degree)
             area = self.scene.kinematics.area_vector(self.u, self.X, face.normal)
             applied = load.share(self) * value
-            work = self._on_tools.work(applied, area)
+            work = self._on_tools.work(applied, area, self._control)
             residual -= self._scale * work
-            if load.driven:
-                by_control -= self._scale * ufl.diff(work, self._control)
+            if load.driven or any(contact.driven for contact in self.scene.contacts):
+                change = -self._scale * ufl.diff(work, self._control)
+                by_control = change if by_control is None else by_control + change
         return residual, by_control, by_time
 
     def constraints(self, support: Any) -> list[Any]:
