@@ -257,6 +257,120 @@ def test_a_hanging_tube_sags_by_its_weight():
     assert path["sag"][-1] == pytest.approx(0.76e-9 * 9810 * 210**2 / 2 / (3 * 0.12), rel=0.02)
 
 
+def test_half_of_a_mould_from_an_stl_file_is_that_of_its_profile(tmp_path):
+    whole = fx.tools.revolved(fx.tools.bottle(
+        radius=30.0, height=96.0, neck=18.0, shoulder=20.0, neck_height=20.0, base=-136.0, fillet=10.0,
+        shoulder_fillet=10.0))
+    whole.to_stl(tmp_path / "mould.stl", wall=8.0)
+    halves = [fx.tools.half(tool, normal="x").moved(x=5.0) for tool in (fx.tools.solid(tmp_path / "mould.stl"), whole)]
+    x = np.random.default_rng(3).uniform((3, -30, -136), (35, 30, -8), (2000, 3))
+    found, expected = (half.signed_distance(x) for half in halves)
+    near = np.abs(expected) < 3                              # the solid of the file is 8 thick
+    assert found[near] == pytest.approx(expected[near], abs=0.2) and near.sum() > 500
+
+
+@pytest.mark.slow
+def test_halves_from_an_stl_file_pinch_and_form_as_those_of_the_profile(tmp_path):
+    whole = fx.tools.revolved(fx.tools.bottle(
+        radius=30.0, height=96.0, neck=18.0, shoulder=20.0, neck_height=20.0, base=-136.0, fillet=10.0,
+        shoulder_fillet=10.0))
+    whole.to_stl(tmp_path / "mould.stl", wall=8.0)
+    walls = []
+    for tool in (whole, fx.tools.solid(tmp_path / "mould.stl")):
+        mesh = fx.mesh.tube(radius=16.0, length=150.0, elements=(22, 5), part="quarter")
+        closing = fx.Scene(
+            mesh=mesh, thickness=2.5, materials=MELT, model=fx.Membrane(wrinkles=0.01),
+            supports=[fx.Clamped("neck"), fx.Symmetry("end", "z", guide=True), *SYMMETRIES["quarter"]],
+            loads=[fx.Pressure("inner", name="air", above=-136.0)],
+            contacts=[fx.Contact("outer", fx.tools.half(tool).moved(x=32.0), "stick", direction=(-1, 0, 0),
+                                 name="mould")])
+        path = fx.Process(closing).run([
+            fx.Stage("pre-blow", control="air", until=fx.pressure(0.002)),
+            fx.Stage("close", control="mould", until=fx.travel(32.0)),
+            fx.Stage("blow", control="air", until=fx.pressure(0.3))], progress=False)
+        walls.append(path.part().min_wall)
+        tail = path.wall().deformed_points[path.wall().reference_points[:, 2] < -140]
+        assert tail[:, 0].max() < 0.01 and 1.5 < tail[:, 1].max() / 16 < np.pi / 2
+    assert walls[1] == pytest.approx(walls[0], rel=0.01)
+
+
+@pytest.mark.thorough
+def test_base_is_pushed_up_after_the_blow():
+    """The middle of the base is a tool of its own, in a hole of the mould: it carries p times its area, and moves."""
+    radius, way, p = 16.5, 12.0, 0.4
+    mould = fx.tools.intersection(BOTTLE, fx.tools.revolved(fx.Tool([(17.0, -150.0), (17.0, -400.0)])), fillet=3.0)
+    base = fx.tools.revolved(fx.Tool([(radius, -225.0), (radius, -180.0), (0.0, -180.0)], [0.0, 8.0, 0.0]))
+    mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(24, 6), part="quarter", end="closed")
+    bottle = fx.Scene(
+        mesh=mesh, thickness=2.5, materials=MELT, model=fx.Membrane(wrinkles=0.01),
+        supports=[fx.Clamped("neck"), *SYMMETRIES["quarter"]], loads=[fx.Pressure("inner", name="air")],
+        contacts=[fx.Contact("outer", mould, "stick", name="mould"),
+                  fx.Contact("outer", base, "stick", direction=(0, 0, 1), name="base")])
+    path = fx.Process(bottle).run([
+        fx.Stage("air", control="air", amplitudes={fx.enclosed_volume: [(0, 0), (1, 480e3)]}),
+        fx.Stage("hold", control="air", until=fx.pressure(p)),
+        fx.Stage("push-up", control="base", until=fx.travel(way))], progress=False)
+    hold = path.state(stage="hold").measures
+    assert hold["base_force"] == pytest.approx(p * np.pi * radius**2, rel=0.25)
+    assert path["base_force"][-1] > hold["base_force"] and path["base_travel"][-1] == way
+    wall = path.wall()
+    middle = np.hypot(*wall.deformed_points[:, :2].T) < 8.0
+    assert wall.deformed_points[middle & (wall.deformed_points[:, 2] < -100), 2] == pytest.approx(-180 + way, abs=0.01)
+    displaced = hold["enclosed_volume"] - path["enclosed_volume"][-1]
+    assert 0.9 < displaced / (np.pi * radius**2 * way) < 1.4
+
+
+RELAXING = fx.Viscoelastic(fx.NeoHookean(c10=0.004), [(0.08, 0.3), (0.03, 3.0)])
+
+
+def test_relaxed_energy_leaves_simple_tension_of_a_relaxing_tube_as_it_is():
+    """In simple tension the relaxed energy is that of the membrane. Its internal variables have the same axes."""
+    sags = []
+    for wrinkles in (None, 0.1):
+        mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(12, 3), part="quarter")
+        hanging = fx.Scene(mesh=mesh, thickness=2.5, materials=RELAXING, model=fx.Membrane(wrinkles=wrinkles),
+                           supports=[fx.Clamped("neck"), *SYMMETRIES["quarter"]],
+                           loads=[fx.Gravity(density=0.76e-9, value=9810.0)])
+        sags.append(fx.Process(hanging).run([fx.Stage("hang", duration=1.0)], progress=False)["sag"][-1])
+    assert sags[1] == pytest.approx(sags[0], rel=1e-3) and sags[0] > 1.1
+
+
+@pytest.mark.slow
+def test_tube_sags_then_halves_close_then_air_blows():
+    """One process of a relaxing tube: it hangs for two seconds, is pinched, and fills the mould."""
+    mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(21, 4), part="quarter")
+    chain = fx.Scene(
+        mesh=mesh, thickness=2.5, materials=RELAXING, supports=[fx.Clamped("neck"), *SYMMETRIES["quarter"]],
+        loads=[fx.Pressure("inner", name="air", above=-180.0), fx.Gravity(density=0.76e-9, value=9810.0)],
+        contacts=[fx.Contact("outer", fx.tools.half(BOTTLE).moved(x=40.0), "stick", direction=(-1, 0, 0),
+                             name="mould")])
+    path = fx.Process(chain).run([
+        fx.Stage("hang", duration=2.0), fx.Stage("close", control="mould", until=fx.travel(40.0), duration=1.0),
+        fx.Stage("blow", control="air", until=fx.pressure(0.6), duration=1.0)], progress=False)
+    assert path.state(stage="hang").measures["sag"] == pytest.approx(1.66, abs=0.05)
+    assert path.last.process_time == pytest.approx(4.0) and path.filling("mould").touching[-1] > 0.95
+    assert path["enclosed_volume"][-1] == pytest.approx(5.44e5, rel=0.02)
+
+
+@pytest.mark.thorough
+def test_k_bkz_tube_is_the_solid_ring_in_plane_strain():
+    """A ring of a thin wall in plane strain, blown by a constant flow: the pressure by time of the solid, H/R apart."""
+    melt, H = fx.KBKZ([(0.10, 0.01), (0.06, 0.1), (0.03, 1.0)], fx.PSM(alpha=10.0, beta=0.05)), 0.01
+    guided = [fx.Symmetry(name, "z", guide=True) for name in ("neck", "end")]
+    ring = fx.Scene(mesh=fx.mesh.tube(radius=1.0, length=0.2, elements=(2, 6), part="quarter"), thickness=H,
+                    materials=melt, supports=[*guided, *SYMMETRIES["quarter"]], model=fx.Membrane(),
+                    loads=[fx.Pressure("inner", name="air")])
+    lines = [[(1 + side * H / 2, z) for z in (0.0, 0.2)] for side in (-1, 1)]
+    solid = fx.Scene(mesh=fx.mesh.from_lines(*lines, elements=(1, 1)), materials=melt,
+                     supports=[fx.Symmetry(name, "z", guide=True) for name in ("start", "end")],
+                     loads=[fx.Pressure("inner", name="air")])
+    volume = 0.2 * np.pi * (1.4**2 - 1)
+    found = [fx.Process(one).run([fx.Stage("blow", control="air", amplitudes={
+        fx.enclosed_volume: [(0.0, 0.0), (0.5, volume)]})], progress=False) for one in (ring, solid)]
+    pressures = [np.interp([0.2, 0.35, 0.5], path["process_time"], path["pressure"]) for path in found]
+    assert pressures[0] == pytest.approx(pressures[1], rel=5e-3)
+
+
 def test_layers_that_cross_are_reported(monkeypatch):
     """A surface whose nodes are moved through each other, or through a plane of symmetry."""
     path = fx.trace(scene(), until=fx.enclosed_volume(1e3), progress=False)

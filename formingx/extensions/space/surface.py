@@ -229,10 +229,16 @@ class _AlwaysAdmissible:
 
 
 def relaxed(F: Any) -> Any:
-    """Return the F whose energy is the relaxed energy of tension-field theory (UFL, shape (3, 3)).
+    r"""Return the F whose energy is the relaxed energy of tension-field theory (UFL, shape (3, 3)).
 
-    Where the membrane is taut, it is F. Where it wrinkles, it is simple tension with the larger principal stretch, in
-    principal axes. Where both stretches are compressive, it is the identity. F: upper triangular, third axis normal.
+    Where the membrane is taut, it is F. Where it wrinkles, it is the stretch tensor U of simple tension with the larger
+    principal stretch l1 of F, along the same direction; where both stretches are compressive, it is the identity. With
+    the angle a of this direction from the first axis and l2 = l1^(-1/2)
+
+    .. math:: U = \frac{l_1 + l_2}{2} I + \frac{l_1 - l_2}{2}
+        \begin{pmatrix} \cos 2a & \sin 2a \\ \sin 2a & -\cos 2a \end{pmatrix}
+
+    The direction matters for materials whose internal variables are tensors. F: upper triangular, third axis normal.
     """
     C11, C22, C12 = F[0, 0]**2, F[0, 1]**2 + F[1, 1]**2, F[0, 0] * F[0, 1]
     J = F[0, 0] * F[1, 1]
@@ -243,11 +249,14 @@ def relaxed(F: Any) -> Any:
     taut = ufl.And(taut, ufl.gt(largest, 1))
     l1 = ufl.sqrt(ufl.conditional(ufl.gt(largest, 1), largest, 1))
     l2 = 1 / ufl.sqrt(l1)
+    mean, deviation = (l1 + l2) / 2, (l1 - l2) / 2
+    cos, sin = (C11 - C22) / 2 / half, C12 / half
 
     def select(a: Any, b: Any) -> Any:
         """Return the UFL expression a where the membrane is taut, else b."""
         return ufl.conditional(taut, a, b)
-    return ufl.as_tensor([[select(F[0, 0], l1), select(F[0, 1], 0), 0], [0, select(F[1, 1], l2), 0],
+    return ufl.as_tensor([[select(F[0, 0], mean + deviation * cos), select(F[0, 1], deviation * sin), 0],
+                          [select(0, deviation * sin), select(F[1, 1], mean - deviation * cos), 0],
                           [0, 0, select(F[2, 2], l2)]])
 
 
