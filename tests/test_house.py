@@ -3,9 +3,11 @@
 import ast
 import functools
 import io
+import sys
 import tokenize
 from collections import Counter
 
+import pytest
 from conftest import ROOT
 
 PACKAGE = ROOT / "formingx"
@@ -160,3 +162,13 @@ def test_the_solver_sees_equations_alone():
                 if node.attr == "forms" or owner in ("problem", "_problem", "equations") and node.attr not in allowed:
                     found.add((file.name, node.attr))
     assert found == set()
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("friction, most", [
+    ("stick", (345, 42, 860)), ("0.3", (350, 42, 850)), ("free", (175, 33, 260))])
+def test_a_step_passes_few_functions_and_files(friction, most):
+    """Functions, files and calls from file to file in a median step; these limits only fall."""
+    sys.path.insert(0, str(ROOT / "benchmarks"))
+    import follow
+    assert all(n <= limit for n, limit in zip(follow.medians(follow.steps(friction)), most, strict=True))
