@@ -216,6 +216,28 @@ def test_wall_part_and_printed_lines_of_a_tube(tmp_path):
     assert len(lines) == 3 + 13 and all(len(line) > 3 for line in lines)
 
 
+def test_measured_wall_of_a_bottle(tmp_path):
+    """Points on the whole bottle, at places of the modelled quarter and of its images, with the wall of the run."""
+    path = fx.trace(scene(), until=fx.enclosed_volume(4e4), progress=False)
+    wall = path.wall()
+    rows = np.linspace(0, len(wall.reference_points) - 1, 9).astype(int)
+    at, points = wall.at(wall.deformed_points[rows]), wall.deformed_points[rows] * [-1, 1, 1]
+    assert at["wall"] == pytest.approx(wall.at_nodes[rows]) and at["distance"].max() < 1e-9
+    assert np.column_stack([at[k] for k in "XYZ"]) == pytest.approx(wall.reference_points[rows], abs=1e-9)
+    middle = wall.at(wall.middle[:5])
+    assert middle["wall"] == pytest.approx(wall.at_nodes[wall.triangles[:5]].mean(1))
+    part = fx.MeasuredWall(wall=1.1 * wall.at_nodes[rows], points=points)
+    assert part.of_path(path) == pytest.approx(wall.at_nodes[rows])
+    found = part.compare(path)
+    assert found.deviation_percent == pytest.approx(-100 / 11) and found.plot()[0].get_xlabel().endswith("first point")
+    assert found.length[-1] == pytest.approx(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    lines = ["x,y,z,wall", *(",".join(map(repr, map(float, row))) for row in np.column_stack([points, part.wall]))]
+    (tmp_path / "wall.csv").write_text("\n".join(lines))
+    assert fx.MeasuredWall.from_csv(tmp_path / "wall.csv").compare(path).rms_percent == pytest.approx(100 / 11)
+    with pytest.raises(fx.InputError, match="the part is in three dimensions: give points"):
+        fx.MeasuredWall(wall=[1.0], length=[3.0]).compare(path)
+
+
 def test_temperature_and_constants_may_depend_on_the_height():
     hot = scene(material=fx.NeoHookean(c10=lambda x, y, z: 0.5 - z / 100), temperature=lambda x, y, z: 150 + z)
     assert hot.temperature.T.x.array.min() == pytest.approx(50.0)

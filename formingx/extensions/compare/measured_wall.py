@@ -31,7 +31,9 @@ class MeasuredWall:
     Args:
         wall: measured thickness, shape (m,), length.
         length: arc lengths along the middle line of the formed part, from the axis, shape (m,), length.
-        points: positions (r, z) on the section of the formed part, shape (m, 2), length.
+        points: positions (r, z) on the section of the formed part, shape (m, 2), length; or positions (x, y, z) on a
+            part in three dimensions, such as a bottle, shape (m, 3). A point of a mirror image counts as its image in
+            the modelled part.
         reference_length: arc lengths along the middle line of the undeformed body, from the axis, shape (m,), length;
             for example of a grid that was printed on the flat sheet.
 
@@ -57,10 +59,10 @@ class MeasuredWall:
                              f" reference_length")
         name, value = next(iter(given.items()))
         positions = finite_array(f"MeasuredWall: {name}", value)
-        shape = wall.shape + (2,) * (name == "points")
-        if wall.ndim != 1 or not len(wall) or positions.shape != shape:
+        shapes = [(*wall.shape, n) for n in (2, 3)] if name == "points" else [wall.shape]
+        if wall.ndim != 1 or not len(wall) or positions.shape not in shapes:
             raise InputError(f"MeasuredWall: wall has the shape {wall.shape}, {name} {positions.shape}: must be (m,)"
-                             f" and {'(m, 2)' if name == 'points' else '(m,)'}")
+                             f" and {'(m, 2) or (m, 3)' if name == 'points' else '(m,)'}")
         for k in np.flatnonzero(wall <= 0)[:1]:
             raise InputError(f"MeasuredWall: wall[{k}] = {wall[k]:g}: must be above 0")
         object.__setattr__(self, "wall", wall)
@@ -70,7 +72,8 @@ class MeasuredWall:
     def from_csv(cls, file: Any) -> MeasuredWall:
         """Read a measured wall from a CSV file.
 
-        The file has a column `wall` (or `thickness`), and one of `length`, `reference_length`, or both `r` and `z`.
+        The file has a column `wall` (or `thickness`), and one of `length`, `reference_length`, both `r` and `z`, or
+        `x`, `y` and `z`.
         Numbers are in the unit of length of the run. Units in the header ("wall [mm]") must be the same in all columns.
 
         Args:
@@ -92,11 +95,12 @@ class MeasuredWall:
             """Return the values of the first column that has one of these names, or None."""
             found = [name for name in table.columns if name.replace(" ", "_") in names]
             return table._replace(units=dict.fromkeys(table.units)).take(found[0]) if found else None
-        wall, r, z = column(_WALL), column(("r",)), column(("z",))
+        wall, r, x, y, z = (column(names) for names in (_WALL, ("r",), ("x",), ("y",), ("z",)))
         if wall is None:
             raise InputError(f"MeasuredWall: {table.name}: has the columns {', '.join(table.columns)}: needs 'wall'")
-        return cls(wall, length=column(_LENGTH), reference_length=column(_REFERENCE),
-                   points=None if r is None or z is None else np.column_stack([r, z]))
+        points = next((np.column_stack(names) for names in ([x, y, z], [r, z]) if all(n is not None for n in names)),
+                      None)
+        return cls(wall, length=column(_LENGTH), reference_length=column(_REFERENCE), points=points)
 
     def of_path(self, path: Path) -> np.ndarray:
         """Return the computed wall thickness in the last state of a path at the measured points.
@@ -111,6 +115,8 @@ class MeasuredWall:
             InputError: a measured `length` or `reference_length` lies outside the computed part by more than a tenth of
                 its length.
         """
+        if self._in_space(path):
+            return np.asarray(self._on_surface(path)["wall"])
         profile = path.profile()
         return np.interp(self._locate(profile)[0], np.arange(len(profile.middle)), profile.wall_thickness)
 
@@ -125,8 +131,14 @@ class MeasuredWall:
 
         Raises:
             InputError: a measured `length` or `reference_length` lies outside the computed part by more than a tenth of
-                its length; or a sheet in three dimensions.
+                its length; or points that are not in the coordinates of the part.
         """
+        if self._in_space(path):
+            found = self._on_surface(path)
+            lines = (np.asarray(self.points), np.column_stack([found[name] for name in "XYZ"]))
+            lengths = [np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))) for line in lines]
+            return WallComparison(*lengths, self.wall, found["wall"], found["distance"], path.problem.comm,
+                                  "the first point")
         profile = path.profile()
         numbers_of_points, distance = self._locate(profile)
         numbers = np.arange(len(profile.middle))
@@ -136,6 +148,22 @@ class MeasuredWall:
             return np.interp(numbers_of_points, numbers, values)
         return WallComparison(interpolated(profile.arc_length), interpolated(profile.reference_length), self.wall,
                               interpolated(profile.wall_thickness), distance, path.problem.comm)
+
+    def _in_space(self, path: Path) -> bool:
+        """Return True for points on a part in three dimensions; raise `InputError` if points and part do not agree."""
+        space, given = path.scene.kinematics.components == 3, self.points is not None and self.points.shape[1] == 3
+        if space != given:
+            raise InputError(f"MeasuredWall: the part is {'in three dimensions' if space else 'a section'}: give"
+                             f" {'points (x, y, z)' if space else 'length, points (r, z) or reference_length'}")
+        return space
+
+    def _on_surface(self, path: Path) -> dict[str, np.ndarray]:
+        """Return wall and reference position at the measured points of a part in three dimensions; collective."""
+        points = np.array(self.points)
+        for plane in path.scene.symmetry.planes:
+            off = np.abs(points[:, plane.axis] - plane.position)
+            points[:, plane.axis] = plane.position + (off if plane.above else -off)
+        return path.wall().at(points)
 
     def _locate(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return positions of measured points on the middle line, (m,), and distances from it, (m,), length.
@@ -168,17 +196,20 @@ class WallComparison:
     The arguments but `comm` are attributes.
 
     Args:
-        length: arc lengths of the points along the computed middle line, from the axis, shape (m,), length.
+        length: arc lengths of the points along the computed middle line, from the axis, shape (m,), length. In three
+            dimensions along the measured points, from the first one.
         reference_length: arc lengths of the points along the undeformed middle line, shape (m,), length.
         measured: measured thicknesses, shape (m,), length.
         computed: computed thicknesses, shape (m,), length.
         distance: distances of points measured by (r, z) from the computed middle line, shape (m,), length. For points
             measured by arc lengths: the arc length by which they lie beyond an end of the line, 0 between the ends.
         comm: MPI communicator of the run.
+        origin: place from which arc lengths are counted, for labels.
     """
 
     def __init__(self, length: np.ndarray, reference_length: np.ndarray, measured: np.ndarray, computed: np.ndarray,
-                 distance: np.ndarray, comm: Any):
+                 distance: np.ndarray, comm: Any, origin: str = "the axis"):
+        self.origin = origin
         self.length, self.reference_length, self.distance = length, reference_length, distance
         self.measured, self.computed, self._comm = measured, computed, comm
 
@@ -198,8 +229,9 @@ class WallComparison:
         return float(np.sqrt(np.mean(self.deviation_percent**2)))
 
     def __str__(self) -> str:
+        surface = "section" if self.origin == "the axis" else "surface"
         lines = [f"{'length':>10}{'measured':>12}{'computed':>12}{'deviation':>12}"]
-        lines += [f"{s:10.4g}{m:12.4g}{c:12.4g}{d:+11.1f} %" + (f"   {a:.3g} off the computed section" * bool(
+        lines += [f"{s:10.4g}{m:12.4g}{c:12.4g}{d:+11.1f} %" + (f"   {a:.3g} off the computed {surface}" * bool(
             a > c)) for s, m, c, d, a in zip(
                 self.length, self.measured, self.computed, self.deviation_percent, self.distance)]
         worst = int(np.abs(self.deviation_percent).argmax())
@@ -224,11 +256,11 @@ class WallComparison:
         order = np.argsort(self.length)
         wall.plot(self.length[order], self.computed[order], "-", label="computed")
         wall.plot(self.length, self.measured, "ko", ms=4, label="measured")
-        wall.set(xlabel="length from the axis", ylabel="wall", ylim=(0, None))
+        wall.set(xlabel=f"length from {self.origin}", ylabel="wall", ylim=(0, None))
         wall.legend()
         deviation.axhline(0, color="0.6", linewidth=1)
         deviation.plot(self.length[order], self.deviation_percent[order], "o-", ms=4)
-        deviation.set(xlabel="length from the axis", ylabel="deviation, %")
+        deviation.set(xlabel=f"length from {self.origin}", ylabel="deviation, %")
         return axes
 
     def to_csv(self, file: Any) -> FilePath:

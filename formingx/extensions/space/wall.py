@@ -9,14 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, count, direction, finite, pair, positive, triple
+from ...errors import InputError, as_points, count, direction, finite, pair, positive, triple
 from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.edges import edges_of
 from ...mesh.nodes import cell_node_positions, own_cells, without_round_off
 from ...ranks import gathered
 from ...results.files.column_table import ColumnTable
 from .surface import wrinkled
-from .surface_mesh import below, volume_within
+from .surface_mesh import below, closest_points, volume_within
 
 
 @dataclass(frozen=True, repr=False)
@@ -224,6 +224,30 @@ class SheetWall(ColumnTable):
                     s = a[k] / (a[k] - b[k])
                     found[row, column] = (1 - s) * cut["wall"][k] + s * cut["wall"][k + 1]
         return {"angle": at, "z": heights, "wall": found}
+
+    def at(self, points: Any) -> dict[str, np.ndarray]:
+        """Return the wall thickness of the modelled part at deformed positions, such as measured ones.
+
+        Each position belongs to the closest point of the surface of triangles. Between the nodes the wall is linear.
+
+        Args:
+            points: positions (x, y, z), shape (k, 3), length.
+
+        Returns:
+            {"wall", "distance", "X", "Y", "Z"}: wall thickness, distance of the position from the middle surface, and
+            reference position of the closest point, shape (k,) each, length.
+        """
+        places = as_points("at: points", points, 3)
+        corners = self.deformed_points[self.triangles]
+        found, rows, away = closest_points(places, corners)
+        a, b, c = corners[rows].swapaxes(0, 1)
+        normal = np.cross(b - a, c - a)
+        square = np.einsum("ni,ni->n", normal, normal)
+        share, nodes = np.stack([np.einsum("ni,ni->n", np.cross(q - p, found - p), normal) / square
+                                 for p, q in ((b, c), (c, a), (a, b))], 1), self.triangles[rows]
+        X = np.einsum("nk,nki->ni", share, self.reference_points[nodes])
+        return {"wall": np.einsum("nk,nk->n", share, self.at_nodes[nodes]), "distance": away,
+                "X": X[:, 0], "Y": X[:, 1], "Z": X[:, 2]}
 
     def mean_ratio(self, point: tuple[float, float, float], radius: float) -> float:
         """Return the mean ratio of deformed to reference thickness around a point of the part.
