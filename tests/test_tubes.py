@@ -216,6 +216,26 @@ def test_wall_part_and_printed_lines_of_a_tube(tmp_path):
     assert len(lines) == 3 + 13 and all(len(line) > 3 for line in lines)
 
 
+@pytest.mark.thorough
+def test_views_from_named_sides_and_the_unrolled_wall(tmp_path):
+    from PIL import Image
+    path, sizes = fx.trace(scene(), until=fx.enclosed_volume(4e4), progress=False), {}
+    for camera in ("side", "top", (1.0, 1.0, 1.0)):
+        path.view3d(tmp_path / "view.png", camera=camera)
+        with Image.open(tmp_path / "view.png") as picture:
+            ink = (np.asarray(picture.convert("RGB"))[:, :750] < 250).any(2)           # without the colour bar
+        rows, columns = np.flatnonzero(ink.any(1)), np.flatnonzero(ink.any(0))
+        sizes[camera] = np.ptp(rows) / np.ptp(columns)
+    size = np.ptp(path.wall().deformed_points, axis=0) * [2, 2, 1]
+    assert sizes["side"] == pytest.approx(size[2] / size[1], rel=0.05)
+    assert sizes["top"] == pytest.approx(1, abs=0.05)
+    with pytest.raises(fx.InputError, match="camera 'left' is not known"):
+        path.view3d(tmp_path / "view.png", camera="left")
+    axes = path.wall().plot_unrolled(angles=10, levels=12)
+    (drawn,) = axes.collections
+    assert drawn.get_array().size == 120 and axes.get_xlabel() == "angle, degrees"
+
+
 def test_measured_wall_of_a_bottle(tmp_path):
     """Points on the whole bottle, at places of the modelled quarter and of its images, with the wall of the run."""
     path = fx.trace(scene(), until=fx.enclosed_volume(4e4), progress=False)

@@ -536,7 +536,7 @@ class Path:
         from .show import plots
         return plots.convergence(self, axes)
 
-    def view3d(self, file: Any, state: State | None = None, grid: float | None = None) -> Picture:
+    def view3d(self, file: Any, state: State | None = None, grid: float | None = None, camera: Any = None) -> Picture:
         """Draw the deformed sheet as a PNG file, coloured by its wall thickness over the original thickness.
 
         An axisymmetric sheet is revolved about the axis, a sheet in plane strain is extruded.
@@ -546,14 +546,17 @@ class Path:
             state: a state of the path; default the last.
             grid: for a sheet in three dimensions: size of the squares of a grid that is printed on the flat sheet,
                 length; default no grid.
+            camera: "front", "side", "top" or "bottom", or the direction (x, y, z) from the part to the camera; default
+                a direction in which the part is seen from all sides.
 
         Returns:
             The picture, which a notebook shows.
 
         Raises:
-            InputError: the name has another ending, the body is not a sheet, or there is neither a screen nor Xvfb.
+            InputError: the name has another ending, the body is not a sheet, an unknown camera, or there is neither a
+                screen nor Xvfb.
         """
-        self._reader.view(file, state or self.last, grid)
+        self._reader.view(file, state or self.last, grid, camera)
         return Picture(file)
 
     def wall(self, state: State | None = None) -> Any:

@@ -47,13 +47,14 @@ class Reader(Protocol):
         In a section the columns are the controls, such as the pressure, and the gap in each corner of the tool.
         """
 
-    def view(self, file: object, state: State, grid: float | None) -> None:
+    def view(self, file: object, state: State, grid: float | None, camera: object) -> None:
         """Draw the body in a state as a PNG file, coloured by its wall over the original thickness.
 
         Args:
             file: its name ends in .png.
             state: the state.
             grid: size of the squares of a grid that is printed on a flat sheet in three dimensions, length; None: none.
+            camera: name of a view, or direction from the part to the camera; None: a default.
         """
 
     def solid(self, state: State) -> tuple:
@@ -103,11 +104,11 @@ class SectionReader:
         from .evaluate.filling import filling
         return filling(self._path, contact)
 
-    def view(self, file: Any, state: State, grid: float | None) -> None:
+    def view(self, file: Any, state: State, grid: float | None, camera: Any) -> None:
         """Draw the revolved or extruded section in a state as a PNG file; `grid` is not used."""
         from .show import views
         draw = views.revolved if self._axisymmetric else views.extruded
-        draw(self._whole(state), file, self._path.problem.comm)
+        draw(self._whole(state), file, self._path.problem.comm, camera)
 
     def solid(self, state: State) -> tuple:
         """Return points (n, 3), triangles (m, 3) and wall ratios (n,) of the whole part in a state."""

@@ -95,12 +95,13 @@ class MeasuredWall:
             """Return the values of the first column that has one of these names, or None."""
             found = [name for name in table.columns if name.replace(" ", "_") in names]
             return table._replace(units=dict.fromkeys(table.units)).take(found[0]) if found else None
-        wall, r, x, y, z = (column(names) for names in (_WALL, ("r",), ("x",), ("y",), ("z",)))
+        wall, places = column(_WALL), {name: column((name,)) for name in "rxyz"}
         if wall is None:
             raise InputError(f"MeasuredWall: {table.name}: has the columns {', '.join(table.columns)}: needs 'wall'")
-        points = next((np.column_stack(names) for names in ([x, y, z], [r, z]) if all(n is not None for n in names)),
-                      None)
-        return cls(wall, length=column(_LENGTH), reference_length=column(_REFERENCE), points=points)
+        given = {name: values for name, values in places.items() if values is not None}
+        axes = next((axes for axes in ("xyz", "rz") if {*axes} <= {*given}), "")
+        return cls(wall, length=column(_LENGTH), reference_length=column(_REFERENCE),
+                   points=np.column_stack([given[name] for name in axes]) if axes else None)
 
     def of_path(self, path: Path) -> np.ndarray:
         """Return the computed wall thickness in the last state of a path at the measured points.
@@ -136,8 +137,8 @@ class MeasuredWall:
         if self._in_space(path):
             found = self._on_surface(path)
             lines = (np.asarray(self.points), np.column_stack([found[name] for name in "XYZ"]))
-            lengths = [np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))) for line in lines]
-            return WallComparison(*lengths, self.wall, found["wall"], found["distance"], path.problem.comm,
+            now, before = (np.append(0.0, np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))) for line in lines)
+            return WallComparison(now, before, self.wall, found["wall"], found["distance"], path.problem.comm,
                                   "the first point")
         profile = path.profile()
         numbers_of_points, distance = self._locate(profile)

@@ -41,9 +41,9 @@ class SheetReader:
         """Return the filling of a tool by the sheet in all states; collective."""
         return parts.filling(self._path, contact)
 
-    def view(self, file: Any, state: State, grid: float | None) -> None:
+    def view(self, file: Any, state: State, grid: float | None, camera: Any) -> None:
         """Draw the whole part in a state as PNG, coloured by its wall thickness (rank 0 draws)."""
-        show.view(self._path, state, file, grid)
+        show.view(self._path, state, file, grid, camera)
 
     def solid(self, state: State) -> tuple:
         """Return points, triangles and wall ratios of the part as a closed surface (`show.solid`)."""

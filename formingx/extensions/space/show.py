@@ -19,7 +19,7 @@ from ...results.show.attempts import Attempts
 from ...results.show.interactive import rounded
 from ...results.show.report import PROCESS, finding_element, introduction, jumps, scripts, versions
 from ...results.show.report_data import of_path
-from ...results.show.views import look, plotted, shading
+from ...results.show.views import camera_direction, look, plotted, shading
 from ...scene.summary import summary
 from ...units import Units
 from .wall import wall_of
@@ -34,22 +34,24 @@ _LARGEST_TOOL = _DRAWN // _FRAMES[0]
 """Largest number of triangles of a tool that a report draws, as many as nodes of the body."""
 
 
-def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
+def view(path: Any, state: Any, file: Any, grid: float | None = None, camera: Any = None) -> None:
     """Draw the whole part as PNG, completed by mirror images and coloured by wall thickness (rank 0 draws).
 
-    grid: size of the squares of a grid printed on the flat sheet, length. Raise `InputError` without screen and Xvfb.
+    grid: size of the squares of a grid printed on the flat sheet, length. camera: see `Path.view3d`. Raise `InputError`
+    without screen and Xvfb.
     """
     file, wall = files.named("view3d", file, ".png"), wall_of(path, state)
+    low, high = wall.deformed_points[:, 2].min(), wall.deformed_points[:, 2].max()
+    default = (1.4, -2.6, 0.9) if not wall.flat else (0.8, -2.0, 3.6) if low < -high else (1.7, -2.4, 1.7)     # look in
+    away = camera_direction(camera, default)
     lines = wall.printed(grid) if grid else []
     images = path.scene.symmetry.images(3)
 
     def draw():
         """Draw the part and the lines of the grid into the file, on rank 0."""
         pyvista = figures.pyvista()
-        below = wall.deformed_points[:, 2].min() < -wall.deformed_points[:, 2].max()            # look into the part
-        camera = np.array([1.4, -2.6, 0.9] if not wall.flat else [0.8, -2.0, 3.6] if below else [1.7, -2.4, 1.7])
         size = np.ptp(wall.deformed_points, axis=0).max()
-        lift = 0.004 * size * camera / np.linalg.norm(camera)           # else lines flicker
+        lift = 0.004 * size * away / np.linalg.norm(away)           # else lines flicker
         values = wall.ratio                                 # of each triangle: means at nodes hide the thinnest
         order = np.argsort(values)
         largest = values[order][np.searchsorted(np.cumsum(wall.area[order]), _DRAWN_AREA * wall.area.sum())]
@@ -62,7 +64,7 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None) -> None:
                 for line in lines:
                     plotter.add_mesh(pyvista.lines_from_points(line * scale + shift + lift), color="black",
                                      line_width=1.5)
-            look(plotter, camera, np.vstack([wall.deformed_points * scale + shift for scale, shift in images]))
+            look(plotter, away, np.vstack([wall.deformed_points * scale + shift for scale, shift in images]))
     files.on_root(path.problem.comm, draw)
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ... import figures
 from ...errors import InputError, as_points, count, direction, finite, pair, positive, triple
 from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.edges import edges_of
@@ -224,6 +225,29 @@ class SheetWall(ColumnTable):
                     s = a[k] / (a[k] - b[k])
                     found[row, column] = (1 - s) * cut["wall"][k] + s * cut["wall"][k + 1]
         return {"angle": at, "z": heights, "wall": found}
+
+    def plot_unrolled(self, axes: Any = None, angles: int = 73, levels: int = 80) -> Any:
+        """Draw the wall of the modelled part over angle and height (`unrolled`), coloured by the wall thickness.
+
+        Args:
+            axes: matplotlib axes; default new ones.
+            angles: number of angles about the z axis.
+            levels: number of heights.
+
+        Returns:
+            The matplotlib axes.
+
+        Raises:
+            InputError: fewer than two angles or heights.
+        """
+        found = self.unrolled(angles, levels)
+        if axes is None:
+            _, axes = figures.figure()
+        drawn = axes.pcolormesh(found["angle"], found["z"], found["wall"], cmap="viridis_r", shading="nearest",
+                                rasterized=True)
+        axes.figure.colorbar(drawn, ax=axes, label="wall")
+        axes.set(xlabel="angle, degrees", ylabel="z")
+        return axes
 
     def at(self, points: Any) -> dict[str, np.ndarray]:
         """Return the wall thickness of the modelled part at deformed positions, such as measured ones.

@@ -13,28 +13,45 @@ from typing import Any
 import numpy as np
 
 from ... import figures
-from ...errors import InputError
+from ...errors import InputError, check_name, direction
 from .. import files
 from ..evaluate.profile import distance_to_line
 
+_CAMERAS = {"front": (0.0, -1.0, 0.0), "side": (1.0, 0.0, 0.0), "top": (0.0, 0.0, 1.0), "bottom": (0.0, 0.0, -1.0)}
 
-def revolved(profile: Any, file: Any, comm: Any) -> None:
+_TILT = 0.05               # of a view along z, against the singular case of VTK
+
+
+def camera_direction(camera: Any, default: tuple[float, float, float]) -> np.ndarray:
+    """Return the direction from a part to the camera, shape (3,), for the name of a view or a direction (x, y, z)."""
+    if isinstance(camera, str):
+        check_name("view3d: camera", camera, tuple(_CAMERAS))
+    found = np.array(default) if camera is None else np.array(_CAMERAS[camera]) if isinstance(camera, str) else (
+        direction("view3d: camera", camera))
+    size = float(np.linalg.norm(found))
+    if np.hypot(*found[:2]) < _TILT * size:                  # z points upwards in the picture, y if seen along z
+        found[1] -= _TILT * size
+    return found
+
+
+def revolved(profile: Any, file: Any, comm: Any, camera: Any = None) -> None:
     """Draw three quarters of an axisymmetric sheet, coloured by the wall ratio, as a PNG (rank 0 draws).
 
     A sheet more than twice as high as wide is drawn as one half. Another ending, or no screen, is an InputError.
     """
     low, high = _bounds(profile)
     tall = high[1] - low[1] > 4 * high[0]
-    turn, camera = (np.pi, (1.2, -3.4, 1.2)) if tall else (1.5 * np.pi, (2.0, -3.4, 1.9))
+    turn, default = (np.pi, (1.2, -3.4, 1.2)) if tall else (1.5 * np.pi, (2.0, -3.4, 1.9))
+    place = camera_direction(camera, default)
 
     def turned(points, angle):
         return points[:, 0] * np.cos(angle), points[:, 0] * np.sin(angle), points[:, 1]
 
     file = files.named("view3d", file, ".png")
-    files.on_root(comm, lambda: _draw(profile, np.linspace(0.0, turn, 181), turned, camera, file))
+    files.on_root(comm, lambda: _draw(profile, np.linspace(0.0, turn, 181), turned, place, file))
 
 
-def extruded(profile: Any, file: Any, comm: Any) -> None:
+def extruded(profile: Any, file: Any, comm: Any, camera: Any = None) -> None:
     """Draw a sheet in plane strain, extruded to 1.5 times its width, as a PNG (rank 0 draws).
 
     The colour is the wall ratio. Another ending, or no screen, is an InputError.
@@ -46,7 +63,8 @@ def extruded(profile: Any, file: Any, comm: Any) -> None:
         return points[:, 0], np.full(len(points), y), points[:, 1]
 
     file = files.named("view3d", file, ".png")
-    files.on_root(comm, lambda: _draw(profile, 0.75 * width * np.array([-1, 1]), shifted, (1.9, -3.4, 1.7), file))
+    place = camera_direction(camera, (1.9, -3.4, 1.7))
+    files.on_root(comm, lambda: _draw(profile, 0.75 * width * np.array([-1, 1]), shifted, place, file))
 
 
 def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -54,7 +72,7 @@ def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
     return profile.outline.min(0), profile.outline.max(0)
 
 
-def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: tuple, file: Any) -> None:
+def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: np.ndarray, file: Any) -> None:
     """Draw the surface that a section sweeps out as a PNG on this rank.
 
     `place` maps points (n, 2) and one of the `stations` (m,) to x, y, z, (n,) each. The camera is a direction from the
