@@ -39,9 +39,7 @@ from ffcx.codegeneration import jit as ffcx_jit
 from .errors import InputError
 
 _FFI = cffi.FFI()
-_DOUBLES, _LONGS = _FFI.typeof("double[]"), _FFI.typeof("long[]")
-NULL = _FFI.NULL
-"""Address of no array, for an optional argument of a function in C."""
+_DOUBLES, _LONGS, _NULL = _FFI.typeof("double[]"), _FFI.typeof("long[]"), _FFI.NULL
 
 
 def supported(jit_options: dict[str, Any]) -> bool:
@@ -221,28 +219,10 @@ def _taking_arrays(function: Any, arguments: list[str]) -> Any:
 
     def call(*values: Any) -> Any:
         return function(*[
-            value if kind is None else NULL if value is None else
+            value if kind is None else _NULL if value is None else
             from_buffer(kind[1], np.ascontiguousarray(value, kind[2]) if kind[0] else value)
             for kind, value in zip(kinds, values, strict=True)])
     return call
-
-
-@functools.cache
-def functions(name: str, header: str, code: str) -> Any:
-    """Return an object of functions in C, compiled at the first call; RuntimeError if that fails."""
-    ffi = cffi.FFI()
-    ffi.cdef(header)
-    return ffi.dlopen(str(library(name, code, ("-O3", "-ffp-contract=off"))))
-
-
-def address(values: Any) -> Any:
-    """Return a pointer to the array `values` of floats for a function in C; to a copy if it is not contiguous."""
-    return from_buffer(_DOUBLES, np.ascontiguousarray(values, dtype=float))
-
-
-def address_of_integers(values: Any) -> Any:
-    """Return a pointer to the array `values` of integers (long in C); to a copy if it is not contiguous."""
-    return from_buffer(_LONGS, np.ascontiguousarray(values, dtype=int))
 
 
 def compile_c(command: list[str], code: str) -> None:

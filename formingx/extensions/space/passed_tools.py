@@ -11,11 +11,12 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..._jit import address, address_of_integers
+from ..._jit import CFunctions
 from ...mesh.nodes import nearest, own_cells
 from ...ranks import gathered
-from .compiled_crossings import compiled
 from .surface_sides import SurfaceSides
+
+_C = CFunctions("extensions/space/crossings.c")
 
 _SPACING = 0.35            # of the points on a tool, over the median edge of the triangles of the sheet
 _MOST_POINTS = 20_000      # on the surface of one tool
@@ -102,8 +103,7 @@ class PassedTool:
         wrong = wrong[:: max(len(wrong) // _MOST_COMPARED, 1)]
         depth, longest = np.zeros(len(wrong)), np.zeros(len(wrong))
         x = np.ascontiguousarray(x[wrong])
-        compiled().distances(len(x), address(x), len(self._cells), address(P), address_of_integers(self._cells),
-                             address(depth), address(longest))
+        _C.distances(len(x), x, len(self._cells), P, self._cells, depth, longest)
         k = int(np.argmax(depth / longest))
         return PassedPoint(float(depth[k] / longest[k]), float(depth[k]), x[k] + shift)
 

@@ -17,10 +17,11 @@ from functools import cached_property
 
 import numpy as np
 
-from ..._jit import NULL, address, address_of_integers
+from ..._jit import CFunctions
 from ...mesh.edges import edges_of
-from .compiled_patches import compiled
 from .lagged_friction import Distances
+
+_C = CFunctions("extensions/space/patches.c")
 
 _FLAT = 1e-9               # distance of control points from a flat triangle that is round-off, over the tool's size
 _SHARP = 1e-3              # sine of the angle between two normals from which on an edge of patches is a crease
@@ -77,8 +78,7 @@ class PatchSurface:
         self._triangles = points, triangles, facet
         self._boxes = np.concatenate([self.patches.min(1), self.patches.max(1)], 1)
         nodes, links, self._order = np.zeros((2 * m, 6)), np.zeros((2 * m, 2), dtype=int), np.zeros(m, dtype=int)
-        used = compiled().build(m, address(self._boxes), address(nodes), address_of_integers(links),
-                                address_of_integers(self._order))
+        used = _C.build(m, self._boxes, nodes, links, self._order)
         self._nodes, self._links = nodes[:used].copy(), links[:used].copy()
 
     def distance(self, x: np.ndarray) -> np.ndarray:
@@ -98,9 +98,8 @@ class PatchSurface:
 
         coordinates: barycentric, for the first two corners, shape (n, 2).
         """
-        out, triangles = np.empty((len(triangles), 6, 3)), np.ascontiguousarray(triangles, dtype=int)
-        compiled().evaluate(len(triangles), address_of_integers(triangles), address(self.patches), address(coordinates),
-                            address(out))
+        out = np.empty((len(triangles), 6, 3))
+        _C.evaluate(len(triangles), triangles, self.patches, coordinates, out)
         return out[:, 0], unit(np.cross(out[:, 1], out[:, 2]))
 
     def _nearest(self, x: np.ndarray, derivatives: bool) -> tuple[Distances, np.ndarray]:
@@ -111,11 +110,8 @@ class PatchSurface:
         n = len(x)
         d, normal, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
         triangles = np.empty(n, dtype=int)
-        compiled().nearest(
-            n, address(x), address(self._nodes), address_of_integers(self._links), address_of_integers(self._order),
-            address(self._boxes), address(self._bulges), address(self.patches), address(d),
-            address(normal) if derivatives else NULL, address(hessian) if derivatives else NULL,
-            address_of_integers(triangles))
+        _C.nearest(n, x, self._nodes, self._links, self._order, self._boxes, self._bulges, self.patches, d,
+                   normal if derivatives else None, hessian if derivatives else None, triangles)
         deep = np.flatnonzero(d > 2 * self._bulges.max())
         if len(deep) and self._bulges.any():                # patches that fold at an edge can give the wrong sign
             outside = deep[self._flat.distance(np.ascontiguousarray(x[deep])) < 0]

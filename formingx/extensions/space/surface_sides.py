@@ -11,10 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ..._jit import address, address_of_integers
+from ..._jit import CFunctions
 from ...mesh.edges import edges_of
 from ...mesh.nodes import SAME_PLACE
-from .compiled_crossings import compiled
+
+_C = CFunctions("extensions/space/crossings.c")
 
 _MAX_LEVELS = 4            # heights at which a curved surface may have open edges
 _SAMPLES = 50              # triangles whose both sides are tried
@@ -86,11 +87,8 @@ class SurfaceSides:
         cell = np.clip(((y[:, :2] - low) / self._size).astype(int), 0, n - 1) @ [n[1], 1]
         first = np.concatenate([[0], np.cumsum(np.bincount(cell, minlength=n[0] * n[1]))])
         ahead, total, number = (np.zeros(len(y), dtype=int) for _ in range(3))
-        compiled().crossings(
-            len(y), address(y), len(self._cells), address(Q), address_of_integers(self._cells),
-            address_of_integers(first), address_of_integers(np.argsort(cell, kind="stable")), low[0], low[1],
-            self._size, n[0], n[1], address_of_integers(ahead), address_of_integers(total),
-            address_of_integers(number))
+        _C.crossings(len(y), y, len(self._cells), Q, self._cells, first, np.argsort(cell, kind="stable"), *low,
+                     self._size, *n, ahead, total, number)
         if self._flat:
             return ahead + ((total == 0) & (x[:, 2] + height < 0)) <= 0, number > 0
         return ahead <= 0, np.ones(len(y), dtype=bool)

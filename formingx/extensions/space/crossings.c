@@ -1,23 +1,6 @@
-"""Points on the wrong side of a sheet, found in C.
-
-A ray from a point along z crosses the triangles of the sheet. The sum of the signs of the crossings says on which side
-of the sheet the point is. The function is compiled once, into the cache folder of compiled forms.
-"""
-
-from __future__ import annotations
-
-from typing import Any
-
-from ..._jit import functions
-from .compiled_patches import TRIANGLE
-
-_HEADER = """
-void crossings(long, const double *, long, const double *, const long *, const long *, const long *, double,
-               double, double, long, long, long *, long *, long *);
-void distances(long, const double *, long, const double *, const long *, double *, double *);
-"""
-
-_SOURCE = TRIANGLE + r"""
+/* Points on the wrong side of a sheet. A ray from a point along z crosses the triangles of the sheet. The sum of the
+   signs of the crossings says on which side of the sheet the point is. */
+#include "triangle.c"
 static long cell(double x, double low, double size, long n)
 {
     double k = floor((x - low) / size);
@@ -79,9 +62,3 @@ void distances(long n, const double *x, long m, const double *P, const long *tri
         distance[k] = sqrt(best);
     }
 }
-"""
-
-
-def compiled() -> Any:
-    """Return the functions in C, compiled at the first call."""
-    return functions("crossings", _HEADER, _SOURCE)
