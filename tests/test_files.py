@@ -7,6 +7,7 @@ import os
 import re
 import shutil
 import subprocess
+import sys
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from html.parser import HTMLParser
@@ -214,6 +215,7 @@ def test_an_animation_is_mp4(formed, tmp_path):
 
 def test_mp4_without_ffmpeg(formed, tmp_path, monkeypatch):
     monkeypatch.setenv("PATH", "")
+    monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)       # the package that brings the program
     with pytest.raises(fx.InputError, match="needs the program ffmpeg"):
         formed.animate(tmp_path / "run.mp4")
 

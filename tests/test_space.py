@@ -11,6 +11,7 @@ from test_demos import summary
 from test_derivatives import assert_derivatives, difference, random_state
 
 import formingx as fx
+from formingx import _compat
 from formingx.__main__ import main
 from formingx.extensions.space.lagged_corrections import LaggedCorrections
 from formingx.extensions.space.part import _positive_share
@@ -120,7 +121,7 @@ def test_a_reflected_mesh_is_symmetric():
         whole = fx.mesh.sheet(outline, size=0.3, reflected=["y0", "x0"]).of_size(size)
         assert set(whole.boundaries) == {"rim", "bottom", "top"} and len(whole.facets_of("rim")) == 4 * len(
             part.facets_of("rim"))
-        (X, cells), (x, few) = ((mesh.domain.geometry.x[:, :2], mesh.domain.geometry.dofmap) for mesh in (whole, part))
+        (X, cells), (x, few) = ((mesh.domain.geometry.x[:, :2], _compat.cell_nodes(mesh.domain)) for mesh in (whole, part))
         assert len(cells) == 4 * len(few)
         places = {tuple(row) for row in np.round(X, 9).tolist()}
         assert len(places) == len(X)
@@ -231,6 +232,7 @@ def test_ranks():
 import json, sys
 sys.path.insert(0, "tests")
 import formingx as fx
+from formingx import _compat
 from test_space import trough
 path = fx.trace(trough(), until=fx.pressure(0.2), progress=False)
 wall = path.wall()

@@ -224,7 +224,7 @@ def _finite_volumes(slab: Slab, start: float, fluxes: tuple, times: Any, cells: 
         flux = -slab.conductivity * np.diff(T) / dx
         inflow = np.concatenate([[fluxes[0](T[0])], flux]) - np.concatenate([flux, [-fluxes[1](T[-1])]])
         return (inflow + heated * width) / (slab.capacity * width)
-    pattern = diags([1, 1, 1], [-1, 0, 1], shape=(n, n))
+    pattern = diags([1.0, 1.0, 1.0], [-1, 0, 1], shape=(n, n))
     solved = solve_ivp(rate, (0, max(times)), np.full(n, start), "Radau", t_eval=times, rtol=1e-9, atol=1e-9,
                        jac_sparsity=pattern)
     return solved.y.T

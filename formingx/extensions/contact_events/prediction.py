@@ -37,11 +37,13 @@ class ContactEventPredictor:
         """Return the number of points of a face, on all ranks, whose gaps may close in one step.
 
         It exceeds `Approach.max_closures` only with stick or friction and `nodes_per_step=None`. On a moving tool
-        points must stick, since long steps of a plug with Coulomb friction may pass a snap.
+        points must stick, since long steps of a plug with Coulomb friction may pass a snap. So must Gauss points: the
+        nodes cannot follow the slip of all of them.
         """
         face, most = approach.face, approach.max_closures
         one_by_one = (not self._limit.several_closures or face.contact.nodes_per_step or face.contact.lagged
-                      or face.moves and not any(c.face.contact.sticks for c in self._limit.active_contacts))
+                      or face.moves and not any(c.face.contact.sticks for c in self._limit.active_contacts)
+                      or not face.contact.sticks and face.contact.points != "nodes")
         if one_by_one or not face.law.has_friction:
             return most
         return max(most, round(MAX_CLOSURES * approach.points))
