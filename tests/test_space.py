@@ -121,7 +121,8 @@ def test_a_reflected_mesh_is_symmetric():
         whole = fx.mesh.sheet(outline, size=0.3, reflected=["y0", "x0"]).of_size(size)
         assert set(whole.boundaries) == {"rim", "bottom", "top"} and len(whole.facets_of("rim")) == 4 * len(
             part.facets_of("rim"))
-        (X, cells), (x, few) = ((mesh.domain.geometry.x[:, :2], _compat.cell_nodes(mesh.domain)) for mesh in (whole, part))
+        (X, cells), (x, few) = ((mesh.domain.geometry.x[:, :2], _compat.cell_nodes(mesh.domain))
+                                for mesh in (whole, part))
         assert len(cells) == 4 * len(few)
         places = {tuple(row) for row in np.round(X, 9).tolist()}
         assert len(places) == len(X)
