@@ -76,6 +76,7 @@ with _optional():
     from .extensions.heat.expansion import ThermalExpansion
     from .extensions.heat.result import HeatRun
     from .extensions.heat.run import heat
+    from .extensions.heat.target import temperature
 with _optional():
     from .extensions.kbkz import rupture as _kbkz_checks
     from .extensions.kbkz.damping import PSM, Damping, DoubleWagner, LuoTanner, SoskeyWinter, Wagner

@@ -231,3 +231,31 @@ def test_a_checkpoint_keeps_the_columns(tmp_path):
     part = process.run([first], progress=False, accuracy="draft", checkpoint=tmp_path / "run")
     again = process.run([first, second], progress=False, accuracy="draft", start=part)
     assert at_times(again, [1.0]) == pytest.approx(at_times(whole, [1.0]), abs=1e-9)
+
+
+def test_oven_ends_at_a_temperature_of_the_core():
+    """A stage ends when the core has its temperature, found by the series; in a section too, and for a point at a face.
+
+    A sheet without heat conduction, a depth in a section and a point outside the sheet are refused.
+    """
+    h, air = (4e-5, 4e-5), (300.0, 300.0)
+    laws = [fx.Convection("bottom", h=h[0], air=air[0]), fx.Convection("top", h=h[1], air=air[1])]
+    heat = fx.Cooling(POLYMER, laws, unit="C", tolerance=2e-3)
+    flat = fx.Scene(mesh=fx.mesh.disc(radius=20.0, thickness=1.0, elements=(3, 4)), materials=fx.NeoHookean(c10=0.1),
+                    supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], temperature=20.0, heat=heat,
+                    loads=[fx.Pressure("bottom", name="air")])
+    times = {}
+    for name, made, target in (("core", scene(heat, temperature=20.0), fx.temperature(150.0, at=(3.0, 4.0))),
+                               ("face", scene(heat, temperature=20.0), fx.temperature(150.0, at=(3.0, 4.0), depth=1.0)),
+                               ("section", flat, fx.temperature(150.0, at=(3.0, 0.5)))):
+        path = fx.Process(made).run([fx.Stage("oven", duration=200.0, until=target)], progress=False, accuracy="draft")
+        times[name] = path.last.time
+        assert path.last.target[0] == "temperature"
+    found = exact.series(SLAB, 20.0, h, air, [0.5, 1.0], [times["core"], times["face"], times["section"]])
+    assert [found[0, 0], found[1, 1], found[2, 0]] == pytest.approx([150.0] * 3, abs=0.05)
+    assert times["face"] < times["core"]
+    stage = fx.Stage("oven", duration=2.0, until=fx.temperature(30.0, at=(30.0, 0.0)))
+    with pytest.raises(fx.InputError, match="is not in the mesh"):
+        fx.Process(scene(heat)).run([stage], progress=False)
+    with pytest.raises(fx.InputError, match="the temperature of the scene does not change"):
+        fx.Process(scene(None)).run([stage], progress=False)

@@ -39,10 +39,19 @@ class EnergyRule(NamedTuple):
         """Return this rule with each point repeated for m depths of a sheet, of weights, shape (m,), whose sum is 1."""
         places = np.repeat(self.places, len(weights), axis=0)
         products = np.outer(self.weights, weights).ravel()
-        return EnergyRule(self.cell, places, products, {
-            "quadrature_rule": "custom", "quadrature_points": places, "quadrature_weights": products},
-            {"points": places, "weights": products})
+        metadata = {"quadrature_rule": "custom", "quadrature_points": places.view(_RuleArray),
+                    "quadrature_weights": products.view(_RuleArray)}
+        return EnergyRule(self.cell, places, products, metadata, {"points": places, "weights": products})
 
     def element(self, shape: tuple[int, ...] = ()) -> Any:
         """Return the quadrature element with a value of a given shape at each point."""
         return basix.ufl.quadrature_element(self.cell.name, value_shape=shape, **self.options)
+
+
+class _RuleArray(np.ndarray):
+    """Points or weights of a rule in the metadata of a measure: they take part in the signature of a form."""
+
+    @property
+    def ufl_signature(self) -> str:
+        """All digits of the array, as text."""
+        return self.tobytes().hex()

@@ -227,6 +227,32 @@ class CoolingHistory:
         self._problem.set_fields(x)
         self._update_problem()
 
+    @property
+    def time(self) -> float:
+        """Process time of the present temperatures."""
+        return self._time
+
+    def ahead(self, time: float, control: float, read: Callable[[], float]) -> float:
+        """Return `read()` with the temperatures that the body has at a later time if it stays where the forms are.
+
+        control: load parameter (control) of the state to which the forms are set, dimensionless. The present
+        temperatures are restored. At an earlier time the present temperatures are read.
+        """
+        if time <= self._time:
+            return read()
+        present = self._time, self._dt, self._state
+        try:
+            self._body.set_inactive(self._inactive_laws())
+            _set_conductances(self._body, self._contacts, control)
+            self._body.update()
+            self._state = [self._body.with_fixed_values(self._state[0]), *self._state[1:]]
+            self._integrate(time)
+            self._set_field(self._state[0], None)
+            return read()
+        finally:
+            self._time, self._dt, self._state = present
+            self._set_field(self._state[0], None if self._before is None else self._before[1])
+
     def _inactive_laws(self) -> list[Any]:
         """Return the laws of heat that are inactive in the current stage."""
         scene, laws = self._problem.scene, self._cooling.boundaries

@@ -28,8 +28,8 @@ from ...heat.contact import ContactWithTool, HeatContact
 from ...heat.implicit_stage import ImplicitStage
 from .basis import ColumnBasis
 
-_MAX_ITERATIONS = 30
-"""Largest number of Newton iterations for the temperatures of the faces."""
+_MAX_ITERATIONS = 100
+"""Largest number of Newton iterations for the temperatures of the faces; radiation in a long step may need many."""
 
 _CONVERGED = 1e-10
 """Largest change of a face temperature in the last iteration, over the largest absolute temperature."""
