@@ -259,3 +259,18 @@ def test_oven_ends_at_a_temperature_of_the_core():
         fx.Process(scene(heat)).run([stage], progress=False)
     with pytest.raises(fx.InputError, match="the temperature of the scene does not change"):
         fx.Process(scene(None)).run([stage], progress=False)
+
+
+@pytest.mark.thorough
+def test_error_without_conduction_along_the_sheet():
+    """The numbers of docs/how/warm_tray.md: half of a sheet on a cold tool, against conduction in two dimensions."""
+    mesh = fx.mesh.disc(radius=20.0, thickness=1.5, elements=(80, 8), concentrate={10.0: 0.05})
+    tool = fx.table({0.0: 1e-3, 9.99: 1e-3, 10.01: 0.0, 20.0: 0.0})
+    run = fx.heat(mesh, POLYMER, [fx.Convection("bottom", h=tool, air=20.0)], start=150.0, times=[2.0], unit="C",
+                  kinematics=fx.PlaneStrain(), tolerance=0.02)
+    body = columns([fx.Convection("bottom", h=1e-3, air=20.0)], (1.5,))
+    (T,), *_ = integrate(body, 2.0, 2e-3)
+    inside = run.at_points([(9.5, 0.0), (9.0, 0.0)])[-1] - T[0, 0]
+    outside = 150.0 - run.at_points([(10.5, 0.0), (11.0, 0.0)])[-1]
+    assert inside / 130.0 == pytest.approx([0.020, 0.002], abs=1e-3)
+    assert outside / 130.0 == pytest.approx([0.09, 0.014], abs=2e-3)

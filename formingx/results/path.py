@@ -388,20 +388,33 @@ class Path:
         state = state or self.last
         return self._view(self.record.segment(state)).profiles.evaluate(state)
 
-    def stress(self, state: State | None = None) -> StressField:
-        """Return the stresses and stretches of a solid body, layer by layer; collective.
+    def stress(self, state: State | None = None, *, depth: float | None = None) -> Any:
+        """Return the stresses of the body in a state; collective.
 
         Args:
             state: a state of the path; default the last.
+            depth: depth in a sheet in three dimensions, from 0 at its bottom (inner) face to 1 at its top (outer) face;
+                None: means over the thickness. A section takes no depth.
 
         Returns:
-            The stress field; its `at_points` gives the stresses at reference positions.
+            Of a solid the stress field (`StressField`), layer by layer; its `at_points` gives the stresses at reference
+            positions. Of a sheet in three dimensions the principal stresses of its triangles (`SheetStress`).
 
         Raises:
-            InputError: the body is a membrane, or a sheet in three dimensions.
+            InputError: the body is a membrane in a section, the material of a sheet is of K-BKZ type, or the depth is
+                not from 0 to 1.
         """
-        section_only(self.scene, "stress", "look at path.wall(): stretches")
-        state = state or self.last
+        return self._reader.stress(state or self.last, depth)
+
+    def stress_field(self, state: State) -> StressField:
+        """Return the stress field of a solid in a state (`Path.stress`); collective.
+
+        Args:
+            state: a state of the path.
+
+        Raises:
+            InputError: the body is a membrane.
+        """
         return self._view(self.record.segment(state)).stresses.evaluate(state)
 
     def to_csv(self, file: Any, units: Units | None = None) -> None:
@@ -457,7 +470,10 @@ class Path:
         fields.to_vtk(self, file, states)
 
     def animate(self, file: Any, frames: int = 60, seconds: float = 5.0, *, units: Units | None = None) -> Picture:
-        """Draw an animation of the forming: the section of the sheet and the loading curve (rank 0 writes).
+        """Draw an animation of the forming (rank 0 writes).
+
+        A section is drawn with its loading curve, a sheet in three dimensions as a picture coloured by its wall, with
+        its tools.
 
         The frames are evenly spaced over the process time, and over the change of the controls in stages without time.
         In a run without time they are evenly spaced over the motion of the controls and the sheet.
@@ -474,10 +490,10 @@ class Path:
 
         Raises:
             InputError: the name of the file has another ending, or ffmpeg is missing for an MP4. `frames` or `seconds`
-                is not positive, the body is not a sheet in a section, or the path has one state only.
+                is not positive, the body is not a sheet, the path has one state only, or a picture in three dimensions
+                has no screen and no Xvfb.
         """
         from .show import animation
-        section_only(self.scene, "animate", "use report, or view3d for each state")
         animation.animate(self, file, frames, seconds, units or NONE)
         return Picture(file)
 
@@ -700,9 +716,8 @@ class Path:
             {entry: energy up to each state, shape (states,)}, stress length^3; in plane strain stress length^2.
 
         Raises:
-            InputError: the body is a sheet in three dimensions, or its material is of K-BKZ type.
+            InputError: a material is of K-BKZ type.
         """
-        section_only(self.scene, "work")
         from .evaluate.work import work
         return work(self)
 

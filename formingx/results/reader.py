@@ -19,6 +19,7 @@ from .numbers import KeyNumbers
 if TYPE_CHECKING:
     from ..contact.face import FaceContact
     from .evaluate.filling import Filling
+    from .evaluate.stress import StressField
     from .evaluate.wall import Wall
     from .files.column_table import ColumnTable
 
@@ -40,6 +41,9 @@ class Reader(Protocol):
             heights: axial distances from the pole at which the wall is listed, length; empty in three dimensions.
             units: units of the script.
         """
+
+    def stress(self, state: State, depth: float | None) -> Any:
+        """Return the stresses of the body in a state; depth: in a sheet in three dimensions, from 0 to 1, or None."""
 
     def filling(self, contact: FaceContact) -> ColumnTable:
         """Return the remaining gaps between the body and the tool of a contact as a table, one row per state.
@@ -95,6 +99,13 @@ class SectionReader:
         """Return the key numbers of the part in a state; see `Path.part`."""
         from .evaluate.part import part
         return part(self.wall(state), self._axisymmetric, density, trim, heights, units, self._path.scene.symmetry)
+
+    def stress(self, state: State, depth: float | None) -> StressField:
+        """Return the stress field of a solid in a state; InputError for a depth, or a membrane."""
+        if depth is not None:
+            raise InputError(f"Path.stress: depth = {depth!r}: is for a sheet in three dimensions: a point of a section"
+                             f" has its depth in Z")
+        return self._path.stress_field(state)
 
     def filling(self, contact: FaceContact) -> Filling:
         """Return the gaps in the corners of a tool (`Path.filling`); InputError for several meshes or no corner."""

@@ -143,7 +143,8 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
         InputError: a membrane; arguments that do not fit the scene; the part does not reach the trim.
         ConvergenceError: no state of the free part was found; it carries the path so far.
     """
-    section_only(path.scene, "springback")
+    section_only(path.scene, "springback", "it needs bending stiffness, which a membrane has not: write the part as"
+                 " shells with path.shell_model(...) for a structural code")
     state = state or path.last
     source = path.record.segment(state).problem
     mesh, trimmed = source.scene.mesh, float(path.wall(state).r[-1])

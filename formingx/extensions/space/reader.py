@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path as FilePath
 from typing import Any
 
+import numpy as np
+
 from ...contact.face import FaceContact
 from ...errors import InputError
+from ...mesh.nodes import own_cells
 from ...results.extend import method_of
 from ...results.path import Path
 from ...solve.state import State
 from ...units import Units
 from . import part as parts
 from . import show
+from .frames import frame_pictures
 from .part import SheetFilling, SheetPart
+from .stress import SheetStress, stress_of
 from .wall import SheetWall, wall_of
 
 
@@ -37,9 +43,35 @@ class SheetReader:
         """Return numbers of the whole formed part in a state (`part.part`); collective."""
         return parts.part(self.wall(state), density, trim, heights, units, self._path.scene.symmetry)
 
+    def stress(self, state: State, depth: float | None) -> SheetStress:
+        """Return the principal stresses of the triangles in a state, means or at a depth; collective."""
+        return stress_of(self._path, state, depth)
+
+    def fields(self, state: State, places: np.ndarray) -> dict[str, np.ndarray]:
+        """Return fields at k places of the m owned triangles in a state, shape (m, k, components), by name; collective.
+
+        They are the principal stresses, the means over the thickness, and the temperatures of a sheet that conducts
+        heat.
+        """
+        problem, found = self._path.problem, {}
+        cells = own_cells(problem.forms.domain)
+        if not any(material.integral for material in problem.scene.materials.values()):
+            rows = problem.forms.domain.topology.original_cell_index[cells]
+            principal = self.stress(state, None).principal[rows]
+            found["principal_stresses"] = np.repeat(principal[:, None], len(places), axis=1)
+        if hasattr(problem.temperature, "through"):
+            with problem.state_context(state):
+                T = problem.temperature.through(cells, places, np.array([0.0, 0.5, 1.0]))
+            found |= {f"temperature_{name}": T[..., k:k + 1] for k, name in enumerate(("bottom", "middle", "top"))}
+        return found
+
     def filling(self, contact: FaceContact) -> SheetFilling:
         """Return the filling of a tool by the sheet in all states; collective."""
         return parts.filling(self._path, contact)
+
+    def pictures(self, frames: int) -> Callable[[], list[Any]]:
+        """Return a function that draws the frames of an animation on rank 0; collective."""
+        return frame_pictures(self._path, frames)
 
     def view(self, file: Any, state: State, grid: float | None, camera: Any) -> None:
         """Draw the whole part in a state as PNG, coloured by its wall thickness (rank 0 draws)."""

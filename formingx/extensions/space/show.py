@@ -34,16 +34,19 @@ _LARGEST_TOOL = _DRAWN // _FRAMES[0]
 """Largest number of triangles of a tool that a report draws, as many as nodes of the body."""
 
 
-def view(path: Any, state: Any, file: Any, grid: float | None = None, camera: Any = None) -> None:
-    """Draw the whole part as PNG, completed by mirror images and coloured by wall thickness (rank 0 draws).
+def view(path: Any, state: Any, file: Any, grid: float | None = None, camera: Any = None,
+         values: np.ndarray | None = None, name: str = "") -> None:
+    """Draw the whole part as PNG, completed by mirror images (rank 0 draws).
 
-    grid: size of the squares of a grid printed on the flat sheet, length. camera: see `Path.view3d`. Raise `InputError`
+    grid: size of the squares of a grid printed on the flat sheet, length. camera: see `Path.view3d`. values: values of
+    the triangles for the colours, shape (m,), and their `name`; None: wall over reference thickness. Raise `InputError`
     without screen and Xvfb.
     """
     file, wall = files.named("view3d", file, ".png"), wall_of(path, state)
     low, high = wall.deformed_points[:, 2].min(), wall.deformed_points[:, 2].max()
     default = (1.4, -2.6, 0.9) if not wall.flat else (0.8, -2.0, 3.6) if low < -high else (1.7, -2.4, 1.7)     # look in
     away = camera_direction(camera, default)
+    shown = wall.ratio if values is None else values         # of each triangle: means at nodes hide the thinnest
     lines = wall.printed(grid) if grid else []
     images = path.scene.symmetry.images(3)
 
@@ -52,15 +55,15 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None, camera: An
         pyvista = figures.pyvista()
         size = np.ptp(wall.deformed_points, axis=0).max()
         lift = 0.004 * size * away / np.linalg.norm(away)           # else lines flicker
-        values = wall.ratio                                 # of each triangle: means at nodes hide the thinnest
-        order = np.argsort(values)
-        largest = values[order][np.searchsorted(np.cumsum(wall.area[order]), _DRAWN_AREA * wall.area.sum())]
+        order = np.argsort(shown)
+        largest = shown[order][np.searchsorted(np.cumsum(wall.area[order]), _DRAWN_AREA * wall.area.sum())]
         faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
         with plotted(file) as plotter:
             for scale, shift in images:
                 surface = pyvista.PolyData(wall.deformed_points * scale + shift, faces)
-                surface.cell_data["ratio"] = values
-                plotter.add_mesh(surface, **shading(np.minimum(values, largest)), specular=0.2, split_sharp_edges=False)
+                surface.cell_data["ratio"] = shown
+                plotter.add_mesh(surface, **shading(np.minimum(shown, largest), name), specular=0.2,
+                                 split_sharp_edges=False)
                 for line in lines:
                     plotter.add_mesh(pyvista.lines_from_points(line * scale + shift + lift), color="black",
                                      line_width=1.5)
@@ -212,6 +215,14 @@ def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
     walls = [wall_of(path, path.states[k]) for k in record.frames]
     ratio = [wall.to_nodes(wall.ratio) for wall in walls]
     shown = {units.label("wall"): [wall.at_nodes for wall in walls], "wall / original": ratio}
+    if not any(material.integral for material in path.scene.materials.values()):
+        stresses = [path.stress(path.states[k]).principal[:, 0] for k in record.frames]
+        shown[units.label("stress", "larger stress")] = [wall.to_nodes(s) for wall, s in zip(walls, stresses)]
+    if path.scene.heat is not None:
+        for depth, face in ((0.0, "bottom"), (1.0, "top")):
+            points = walls[0].reference_points[:, :2 if walls[0].flat else 3]
+            shown[f"temperature, {face}"] = [path.temperature(points, path.states[k], depth=depth)
+                                             for k in record.frames]
     tools = []
     for k, (contact, name) in enumerate(zip(record.tooling.contacts, record.tooling.names)):
         points, triangles = contact.tool.surface()

@@ -366,7 +366,8 @@ def balance(path: Any) -> dict[str, np.ndarray]:
     """
     if "strain_energy" not in path.columns:
         raise InputError("Path.work: is not available with K-BKZ: its stored energy is no function of its state")
-    balances = [EnergyBalance(segment).rows() for segment in path.record.segments]
+    balances = [getattr(segment.problem.forms, "energy_balance", EnergyBalance)(segment).rows()
+                for segment in path.record.segments]
     names = dict.fromkeys(name for rows in balances for name in rows)
     empty = [np.zeros(len(segment.states)) for segment in path.record.segments]
     found = {name: np.cumsum(np.concatenate([rows.get(name, zero) for rows, zero in zip(balances, empty)]))

@@ -11,14 +11,16 @@ Every triangle has six nodes of its own, so nothing is averaged over an interfac
     elastic_stretch_1, _2   larger principal stretch of the elastic part of F in each relaxing branch, see below.
     contact_pressure        normal traction per deformed area of all tools, stress.
     thickness, thickness_ratio  thickness of the sheet at each point, length, and its ratio to the original thickness.
+    temperature_bottom, _middle, _top  temperatures of a sheet in three dimensions that conducts heat.
 
 F is the deformation gradient, Cv or A the internal variable of a branch (`Viscoelastic`, `TransientNetwork`). The
 square of the elastic stretch is the larger eigenvalue of F Cv^-1 F^T or F A F^T in the section, without volume change.
 The elastic stretch is 1 if the branch has relaxed, and the largest stretch if it has not relaxed at all. It is linear
 in each triangle, and nan in layers without such a branch.
 
-The contact pressure is less accurate at the two nodes nearest the axis, which share their areas. A membrane has
-displacement and thickness only.
+The contact pressure is less accurate at the two nodes nearest the axis, which share their areas. A membrane in a
+section has displacement and thickness only. A sheet in three dimensions has these, the temperatures, and two principal
+stresses in its surface, the means over its thickness, constant in each triangle.
 """
 
 from functools import partial
@@ -75,6 +77,7 @@ class Fields:
             with problem.state_context(state):
                 h = self._eval(self._wall)
             found |= {"thickness": h[..., 0], "thickness_ratio": h[..., 1]}
+            found |= problem.scene.kinematics.reader(self._path).fields(state, _NODES[2])
         elif self.dimension == 2:
             field = self._path.stress(state)
             stress = field.in_cells(_NODES[2])

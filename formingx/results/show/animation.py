@@ -5,6 +5,7 @@ The loading curve of a stage is, for example, the force of a plug over its trave
 
 import shutil
 import subprocess
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +20,7 @@ from . import plots
 from .report_data import progress
 
 
-def _between(record: Any, a: Any, b: Any, fraction: float) -> Any:
+def between(record: Any, a: Any, b: Any, fraction: float) -> Any:
     """Return the state at a fraction from a state to the next, on the cubic through both; it is not in equilibrium.
     If `b` begins another stage, it is `b`."""
     if a.setting != b.setting:
@@ -41,21 +42,28 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
     frames, seconds = count("animate: frames", frames), positive("animate: seconds", seconds)
     if len(path) < 2:
         raise InputError(f"animate: the path has {len(path)} states: nothing moves")
+    reader = path.scene.kinematics.reader if path.scene.kinematics.components == 3 else None
+    make = reader(path).pictures(frames) if reader else _section_pictures(path, frames, units)
+
+    def draw():
+        save = _save_gif if file.suffix.lower() == ".gif" else _save_mp4
+        pictures = make()
+        files.replace(file, lambda stream: save(pictures, seconds, stream), "wb")
+    files.on_root(path.problem.comm, draw)
+
+
+def _section_pictures(path: Any, frames: int, units: Units) -> Callable[[], list[Any]]:
+    """Return a function that draws the frames of a section on rank 0; collective."""
     shapes, tools, now, tooling, shown = [], [], [], Tooling.of_problem(path.problem), columns_of_stages(path)
-    for a, b, fraction in spread(path, frames):
-        interpolated = _between(path.record, a, b, fraction)
+    for a, b, fraction in spread(path, frames, [path.profile(state) for state in path.states]):
+        interpolated = between(path.record, a, b, fraction)
         shapes.append(path.profile(interpolated))
         names = shown[b.stage]
         now.append((names, [a.measures[c] + fraction * (b.measures[c] - a.measures[c]) for c in names]))
         tools.append(tooling.placed(tooling.travels(interpolated.setting, interpolated.control)))
     curves = {names: path.curve(*names) for names in shown.values()}
     both_sides = has_image_at_axis(path.problem.scene)
-
-    def draw():
-        pictures = _draw(shapes, tools, now, curves, both_sides, units)
-        save = _save_gif if file.suffix.lower() == ".gif" else _save_mp4
-        files.replace(file, lambda stream: save(pictures, seconds, stream), "wb")
-    files.on_root(path.problem.comm, draw)
+    return lambda: _draw(shapes, tools, now, curves, both_sides, units)
 
 
 def _ffmpeg() -> str | None:
@@ -79,9 +87,11 @@ def has_image_at_axis(scene: Any) -> bool:
     return ring or any(plane.axis == 0 and abs(plane.position) <= near for plane in scene.symmetry.planes)
 
 
-def spread(path: Any, frames: int) -> list[tuple[Any, Any, float]]:
-    """Return (state, next state, position 0 to 1) of frames evenly spaced over the progress of the process."""
-    profiles = [path.profile(state) for state in path.states]
+def spread(path: Any, frames: int, profiles: list[Any]) -> list[tuple[Any, Any, float]]:
+    """Return (state, next state, position 0 to 1) of frames evenly spaced over the progress of the process.
+
+    profiles: the profile of each state, or None.
+    """
     done = progress({c: path[c] for c in path.columns}, profiles)
     found = []
     for s in np.linspace(0, done[-1], frames) if frames > 1 else done[-1:]:

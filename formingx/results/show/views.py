@@ -125,12 +125,16 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
     files.replace(file, lambda stream: stream.write(picture.getvalue()), "wb")
 
 
-def shading(values: np.ndarray) -> dict[str, Any]:
-    """Return arguments of pyvista's `add_mesh` that colour by "ratio", (n,), with a colour bar over its range."""
-    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), 0.01) / 2     # a flat sheet is of one colour
-    bar = {"title": "thickness /\noriginal\n", "color": "black", "vertical": True, "position_x": 0.83,
-           "position_y": 0.2, "height": 0.6, "width": 0.09, "title_font_size": 34, "label_font_size": 34,
-           "fmt": "%.2f", "n_labels": 5}
+def shading(values: np.ndarray, name: str = "") -> dict[str, Any]:
+    """Return arguments of pyvista's `add_mesh` that colour by "ratio", (n,), with a colour bar over its range.
+
+    The values are those of `name`; without it they are walls over the original wall.
+    """
+    least = 1e-6 * float(np.abs(values).max()) if name else 0.01
+    middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), least) / 2    # a flat sheet is of one colour
+    bar = {"title": f"{name}\n" if name else "thickness /\noriginal\n", "color": "black", "vertical": True,
+           "position_x": 0.83, "position_y": 0.2, "height": 0.6, "width": 0.09, "title_font_size": 34,
+           "label_font_size": 34, "fmt": "%.3g" if name else "%.2f", "n_labels": 5}
     return {"scalars": "ratio", "cmap": "viridis_r", "clim": (middle - half, middle + half), "scalar_bar_args": bar,
             "smooth_shading": True, "ambient": 0.45, "diffuse": 0.65, "specular_power": 20}
 

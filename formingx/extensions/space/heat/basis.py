@@ -38,6 +38,15 @@ class Layer:
         self.points = slice(first, first + len(weights))
         self.weights, self.share = weights, share
 
+    def gauss(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return depths (0 to 1 in the layer) and weights of a Gauss rule, shape (count,), and its shape functions.
+
+        The shape functions of the m points of the layer at these depths have the shape (count, m).
+        """
+        at, weights = np.polynomial.legendre.leggauss(count)
+        depths = (at + 1) / 2
+        return depths, weights / 2, lagrange(gauss_lobatto(len(self.weights) - 1)[0], depths)
+
 
 class ColumnBasis:
     """Basis of the temperatures through the thickness of a sheet, with m points.

@@ -55,6 +55,12 @@ class ColumnTemperature:
         found = np.array([np.einsum("qa,cam->cqm", shapes, T[nodes][..., points]) for T in states])
         return np.clip(found, *self.limits)
 
+    def through(self, cells: np.ndarray, places: np.ndarray, depths: np.ndarray) -> np.ndarray:
+        """Return temperatures at q places of cells and n depths from 0 to 1, shape (cells, q, n), within `limits`."""
+        shapes = np.asarray(self._element.tabulate(0, places)[0])
+        corners = self.now[self.sheet.cells(cells)] @ self.basis.shapes(depths).T
+        return np.clip(np.einsum("qa,can->cqn", shapes, corners), *self.limits)
+
     def at_points(self, points: np.ndarray, depth: np.ndarray | None = None) -> np.ndarray:
         """Return the temperatures at reference points, shape (n, 2 or 3), and depths from 0 to 1; collective.
 
