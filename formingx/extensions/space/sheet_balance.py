@@ -22,35 +22,40 @@ class SheetBalance(EnergyBalance):
     force yet.
     """
 
-    def __init__(self, segment: Any):
-        super().__init__(segment)
-        forms = self._problem.forms
-        removed = iter(forms.pressure_works)
-        if forms.pressure_works:                             # without the tangential part on a sheet that slides
-            self._loads = [(name, forms.compile(work + next(removed)[0]) if isinstance(load, Pressure) else form)
-                           for (name, form), work, load in zip(self._loads, forms.load_works, forms.scene.loads)]
-
     def _body_energies(self, a: Any, b: Any) -> dict[str, float]:
         found = super()._body_energies(a, b)
-        slides = [contact.law for contact in self._problem.contacts if _has_friction(contact)]
-        for name, sliding in (("friction", True), ("bonds", False)):
+        slides = [contact for contact in self._problem.contacts if _has_friction(contact)]
+        friction, bonds, carried = self._absorbed(a, b)
+        for name, value, there in (("friction", friction, slides),
+                                   ("bonds", bonds, len(slides) < len(self._problem.contacts))):
             found.pop(name, None)
-            if len(slides) if sliding else len(slides) < len(self._problem.contacts):
-                found[name] = self._absorbed(a, b, sliding)
+            if there:
+                found[name] = value
+        if carried:                                          # pressure between the points, which the tools carry
+            name = next(name for (name, _), load in zip(self._loads, self._problem.scene.loads)
+                        if isinstance(load, Pressure))
+            found[name] -= carried
         return found
 
-    def _absorbed(self, a: Any, b: Any, sliding: bool) -> float:
-        """Return the energy that contacts absorb in a step, those with friction or the others, stress length^3."""
+    def _absorbed(self, a: Any, b: Any) -> tuple[float, float, float]:
+        """Return the energies that contacts absorb in a step: with friction, without, and by carried pressures."""
+        found = np.zeros(3)
         if a.setting != b.setting or b.kind == "jump":
-            return 0.0
+            return 0.0, 0.0, 0.0
         ends = []
         for state in (a, b):
             with self._problem.state_context(state) as problem:
-                fields = state.x[: problem.n_owned]
-                ends.append([(c.positions(fields, state.control),
-                              c.area[:, None] * c.tractions(fields, state.control).force)
-                             for c in problem.active_contacts if _has_friction(c) == sliding])
-        return sum(self._sum(np.einsum("ni,ni->n", (fa + fb) / 2, xb - xa)) for (xa, fa), (xb, fb) in zip(*ends))
+                fields, forces = state.x[: problem.n_owned], []
+                for contact in problem.active_contacts:
+                    own = contact.area[:, None] * contact.tractions(fields, state.control).force
+                    all_forces = contact.forces(fields, state.control)
+                    forces.append((_has_friction(contact), contact.positions(fields, state.control), own,
+                                   all_forces - own))
+                ends.append(forces)
+        for (slides, xa, *fa), (_, xb, *fb) in zip(*ends):
+            own, carried = (self._sum(np.einsum("ni,ni->n", (p + q) / 2, xb - xa)) for p, q in zip(fa, fb))
+            found += [own if slides else 0.0, 0.0 if slides else own, carried]
+        return float(found[0]), float(found[1]), float(found[2])
 
 
 def _has_friction(contact: Any) -> bool:
