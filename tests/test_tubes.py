@@ -258,6 +258,19 @@ def test_measured_wall_of_a_bottle(tmp_path):
         fx.MeasuredWall(wall=[1.0], length=[3.0]).compare(path)
 
 
+def test_a_design_of_a_tube_names_the_search_that_works():
+    tool = fx.tools.revolved(fx.tools.bottle(radius=20.0, height=70.0, neck=18.0, shoulder=10.0, neck_height=15.0,
+                                             base=-105.0, fillet=4.0, shoulder_fillet=4.0))
+    design = fx.Design(lambda wall: (scene(thickness=wall, contacts=[fx.Contact("outer", tool, "stick")]),
+                                     fx.enclosed_volume(2e4)), {"wall": (0.5, 0.3, 0.8)})
+    run = design.run()
+    assert run.path.part().min_wall > 0.2
+    with pytest.raises(fx.InputError, match=r"no derivative of contact in three dimensions yet; fx.wall_programme"):
+        run.derivative("volume")
+    with pytest.raises(fx.InputError, match=r"has no section.* fx.wall_programme finds the thickness"):
+        design.minimum_weight(min_wall=0.3)
+
+
 def test_temperature_and_constants_may_depend_on_the_height():
     hot = scene(material=fx.NeoHookean(c10=lambda x, y, z: 0.5 - z / 100), temperature=lambda x, y, z: 150 + z)
     assert hot.temperature.T.x.array.min() == pytest.approx(50.0)
