@@ -65,6 +65,21 @@ def test_half_moulds_fill_the_whole_mould_and_stand_apart():
         fx.tools.half(BOTTLE, normal="r")
 
 
+def test_surface_of_an_intersection_is_cut_where_the_parts_meet():
+    """The neck of the bottle, whose long triangles pass the edge, belongs to it; no triangle stands in the cavity."""
+    points, triangles = BOTTLE.surface()
+    middle = points[triangles].mean(1)
+    neck = np.abs(np.hypot(*middle[:, :2].T) - 17) < 0.5            # down to z = -18.4 at the edges, -24.4 at the faces
+    area = np.linalg.norm(np.cross(*(points[triangles][:, k] - points[triangles][:, 0] for k in (1, 2))), axis=1) / 2
+    assert 28.4 < area[neck].sum() / (2 * np.pi * 17) < 34.4
+    assert np.abs(BOTTLE.signed_distance(middle)).max() < 2.0                   # in the fillet, and off by chords
+    right = fx.tools.half(BOTTLE)
+    corners, cells = right.surface()
+    assert corners[:, 0].min() > -1e-9
+    halved = np.linalg.norm(np.cross(*(corners[cells][:, k] - corners[cells][:, 0] for k in (1, 2))), axis=1).sum() / 2
+    assert 2 * halved == pytest.approx(area.sum(), rel=1e-3)
+
+
 def test_pressure_above_a_height_acts_on_this_part_alone():
     mesh = fx.mesh.tube(radius=16.0, length=60.0, elements=(12, 4), part="quarter")
     found = fx.Scene(mesh=mesh, thickness=2.0, materials=fx.NeoHookean(c10=0.5),

@@ -14,6 +14,9 @@ _DEPTH = 1e-3
 Layers that a mould presses flat lie on each other to its penetration.
 """
 
+_DEPTH_OF_WALL, _DEPTH_OF_EDGE = 0.5, 1 / 3
+"""The same over the mean thickness, and at most over the median edge: layers at a pinch lie within the wall."""
+
 
 @register("end")
 def crossing_layers(path: Any) -> Iterator[Finding]:
@@ -32,7 +35,9 @@ def crossing_layers(path: Any) -> Iterator[Finding]:
         if beyond.max() > 10 * _DEPTH * size:
             yield _finding(f"the surface passes {beyond.max():.3g} through the plane of symmetry"
                            f" {'xyz'[plane.axis]} = {plane.position:.4g}", x[np.argmax(beyond)])
-    places = crossings(x, wall.triangles, _DEPTH * size)
+    edge = float(np.median(np.linalg.norm(np.diff(x[wall.triangles], axis=1), axis=2)))
+    thickness = float(wall.reference_thickness.mean())
+    places = crossings(x, wall.triangles, max(_DEPTH * size, min(_DEPTH_OF_WALL * thickness, _DEPTH_OF_EDGE * edge)))
     if len(places):
         yield _finding(f"layers of the surface pass through each other at {len(places)} edges", places[0])
 

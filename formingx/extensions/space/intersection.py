@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 
 from ...errors import InputError, check_name, check_type, finite, non_negative
+from .bodies import merged
 from .lagged_friction import Distances
 from .solid_tool import SolidTool
+from .surface_mesh import positive_part
+
+_CUT_PIECES = 40           # extent of a surface over the longest edge of triangles that are cut
 
 
 class HalfSpace(SolidTool):
@@ -91,27 +97,54 @@ class Intersection(SolidTool):
         return self._combined(self.first.signed_distance(x), self.second.signed_distance(x))
 
     def _surface(self):
-        """Return vertices and triangles of both surfaces, as far as they lie in the other solid.
+        """Return vertices, shape (n, 3), length, and vertex numbers of triangles, shape (m, 3), of the unmoved tool."""
+        return self._visible
 
-        Their shapes are (n, 3), length, and (m, 3).
+    @cached_property
+    def _visible(self) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices and triangles of both surfaces, as far as they lie in the other solid, (n, 3), length, and (m, 3).
         """
         points, triangles, n = [], [], 0
         for tool, other in ((self.first, self.second), (self.second, self.first)):
             x, cells = tool.surface()
             if not len(cells):
                 continue
-            near = 1e-9 * float(np.ptp(x, axis=0).max())
-            kept = cells[(other.signed_distance(x) > -near)[cells].all(1)]
-            used, number = np.unique(kept, return_inverse=True)
-            points.append(x[used])
-            triangles.append(number.reshape(-1, 3) + n)
-            n += len(used)
+            corners = _inside(x[cells], other, float(np.ptp(x, axis=0).max()))
+            points.append(corners.reshape(-1, 3))
+            triangles.append(np.arange(3 * len(corners)).reshape(-1, 3) + n)
+            n += 3 * len(corners)
         if not points:
             raise InputError(f"{self!r}: has no surface: both tools are half spaces")
-        return np.vstack(points), np.vstack(triangles)
+        return merged(np.vstack(points), np.vstack(triangles))
 
     def __repr__(self) -> str:
         return f"intersection({self.first!r}, {self.second!r}{f', fillet={self.fillet:g}' if self.fillet else ''})"
+
+
+def _inside(corners: np.ndarray, tool: SolidTool, size: float) -> np.ndarray:
+    """Return the triangles of a surface that lie in the solid of a tool, cut at its surface, shape (k, 3, 3), length.
+
+    corners: shape (m, 3, 3), length; size: extent of the surface, length. Triangles that the surface of the tool may
+    cross are halved until they are short.
+    """
+    found, near = [], 1e-9 * size
+    while len(corners):
+        d = tool.signed_distance(corners.reshape(-1, 3)).reshape(-1, 3)
+        edges = np.linalg.norm(np.roll(corners, -1, axis=1) - corners, axis=2)
+        longest = edges.max(1)
+        inside = (d > -near).all(1)
+        away = (d < -longest[:, None]).any(1)
+        short = longest < size / _CUT_PIECES
+        found.append(corners[inside])
+        cut = short & ~inside & ~away
+        points, cells, _ = positive_part(corners[cut], d[cut])
+        found.append(points[cells])
+        rest = ~inside & ~away & ~short
+        k = edges[rest].argmax(1)
+        a, b, c = corners[rest][np.arange(len(k))[:, None], (k[:, None] + np.arange(3)) % 3].swapaxes(0, 1)
+        middle = (a + b) / 2
+        corners = np.concatenate([np.stack([a, middle, c], 1), np.stack([middle, b, c], 1)])
+    return np.concatenate(found)
 
 
 def intersection(first: SolidTool, second: SolidTool, fillet: float = 0.0) -> Intersection:

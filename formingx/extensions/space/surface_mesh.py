@@ -200,22 +200,28 @@ def volume_within(points: np.ndarray, triangles: np.ndarray) -> float:
 
 
 def below(points: np.ndarray, triangles: np.ndarray, level: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the part of a surface below the plane z = `level`, length.
+    """Return the part of a surface below the plane z = `level`, length (`positive_part`)."""
+    return positive_part(points[triangles], level - points[triangles][..., 2])
 
-    Vertices, shape (k, 3), length; triangles, shape (j, 3); for each of these the number of its triangle of the
-    surface, shape (j,).
+
+def positive_part(corners: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the part of triangles in which a linear function is not negative.
+
+    corners: shape (m, 3, 3), length; values at them, shape (m, 3). Vertices, shape (k, 3), length; triangles, shape (j,
+    3); for each of these the number of its triangle of the surface, shape (j,).
     """
-    under = points[triangles][..., 2] <= level
-    whole, cut = np.flatnonzero(under.all(1)), np.flatnonzero(under.any(1) & ~under.all(1))
-    first = np.where(under[cut].sum(1) == 1, under[cut].argmax(1), (~under[cut]).argmax(1))    # alone on its side
-    a, b, c = (points[np.take_along_axis(triangles[cut], ((first + k) % 3)[:, None], 1)[:, 0]] for k in range(3))
-    p, q = (a + ((level - a[:, 2:]) / (end - a)[:, 2:]) * (end - a) for end in (b, c))
-    single = under[cut].sum(1) == 1
+    inside = values >= 0
+    whole, cut = np.flatnonzero(inside.all(1)), np.flatnonzero(inside.any(1) & ~inside.all(1))
+    first = np.where(inside[cut].sum(1) == 1, inside[cut].argmax(1), (~inside[cut]).argmax(1))    # alone on its side
+    order = (first[:, None] + np.arange(3)) % 3
+    (a, b, c), (f, g, h) = corners[cut[:, None], order].swapaxes(0, 1), values[cut[:, None], order].T
+    p, q = (a + (f / (f - other))[:, None] * (end - a) for end, other in ((b, g), (c, h)))
+    single = inside[cut].sum(1) == 1
     tips = np.stack([a, p, q], 1)[single]
     rests = np.concatenate([np.stack([p, b, c], 1)[~single], np.stack([p, c, q], 1)[~single]])
-    corners = np.concatenate([points[triangles[whole]], tips, rests])
+    found = np.concatenate([corners[whole], tips, rests])
     owner = np.concatenate([whole, cut[single], cut[~single], cut[~single]])
-    return corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3), owner
+    return found.reshape(-1, 3), np.arange(3 * len(found)).reshape(-1, 3), owner
 
 
 def surface_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str, faces: tuple[str, str],
