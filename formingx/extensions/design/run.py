@@ -126,8 +126,8 @@ class DesignRun:
         """Outline of the formed part in the last state of the run; `InputError` for a part in three dimensions."""
         if self.path.scene.kinematics.components == 3:
             raise InputError("Design: a part in three dimensions has no section, and its contact no derivatives yet:"
-                             " fx.wall_programme finds the thickness of a parison along its meridian for a minimum wall,"
-                             " and fx.study varies any numbers")
+                             " fx.wall_programme finds the thickness of a parison along its meridian for a minimum"
+                             " wall, and fx.study varies any numbers")
         return self.path.profile()
 
     @cached_property

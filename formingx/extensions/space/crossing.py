@@ -14,7 +14,7 @@ _DEPTH = 1e-3
 Layers that a mould presses flat lie on each other to its penetration.
 """
 
-_DEPTH_OF_WALL, _DEPTH_OF_EDGE = 0.5, 1 / 3
+_DEPTH_OF_WALL, _DEPTH_OF_EDGE = 0.5, 0.4
 """The same over the mean thickness, and at most over the median edge: layers at a pinch lie within the wall."""
 
 
