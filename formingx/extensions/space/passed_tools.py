@@ -88,7 +88,7 @@ class PassedTool:
         """
         face, x, sides = self._face, self._points, self._sides
         P = self._placed(face.positions(fields, control))
-        x = x[sides.within(x, P)] if sides.known else x[:0]
+        x = x[sides.within(x, P, not self._faces_out)] if sides.known else x[:0]
         if not len(x):
             return None
         shift = face.tool_displacement(control)

@@ -185,8 +185,9 @@ def check_contact(scene: Any, contact: Any) -> None:
     if contact.points != "nodes":
         raise InputError(f"{contact!r}: points = {contact.points!r}: in three dimensions contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
-    if tool.sized and np.isfinite(size) and not 1 / _EXTENT_RATIO < length / size < _EXTENT_RATIO:
-        raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {length:.4g}: are the units of length"
+    whole = (2 if any(isinstance(support, Symmetry) for support in scene.supports) else 1) * length
+    if tool.sized and np.isfinite(size) and not 1 / _EXTENT_RATIO < whole / size < _EXTENT_RATIO:
+        raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {whole:.4g}: are the units of length"
                          f" the same (mm, cm, inches)?")
     points = gathered(mesh.comm, mesh.domain.geometry.x)
     depth = tool.signed_distance(points)

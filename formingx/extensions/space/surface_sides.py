@@ -55,15 +55,16 @@ class SurfaceSides:
                          > X[:, 2].mean() else -1.0) for level in levels[:_MAX_LEVELS]]
         self.known = len(levels) <= _MAX_LEVELS and self._consistent(X)
 
-    def within(self, x: np.ndarray, P: np.ndarray) -> np.ndarray:
+    def within(self, x: np.ndarray, P: np.ndarray, beyond: bool) -> np.ndarray:
         """Return the mask of points, shape (n, 3), whose side is known; nodes P, shape (k, 3), length.
 
         A flat sheet has sides over its extent. A curved surface has them between its lids and planes of symmetry.
+        beyond: False to leave out points beyond the extent of a curved surface, which are outside.
         """
         low, high = P.min(0), P.max(0)
         if self._flat:
             low[2], high[2] = -np.inf, np.inf
-        else:
+        elif beyond:
             cut = np.zeros((2, 3), dtype=bool)
             for plane in self._planes:
                 cut[0 if plane.above else 1, plane.axis] = True
