@@ -274,3 +274,16 @@ def test_error_without_conduction_along_the_sheet():
     outside = 150.0 - run.at_points([(10.5, 0.0), (11.0, 0.0)])[-1]
     assert inside / 130.0 == pytest.approx([0.020, 0.002], abs=1e-3)
     assert outside / 130.0 == pytest.approx([0.09, 0.014], abs=2e-3)
+
+
+def test_a_tube_cools_from_its_outer_face():
+    """Depth 0 is the inner face: the temperatures of a slab between air of 60 C inside and 20 C outside."""
+    h, air = (1e-4, 1e-3), (60.0, 20.0)
+    tube = fx.mesh.tube(radius=10.0, length=40.0, elements=(6, 6), part="quarter", end="closed")
+    laws = [fx.Convection("inner", h=h[0], air=air[0]), fx.Convection("outer", h=h[1], air=air[1])]
+    made = fx.Scene(mesh=tube, thickness=1.0, materials=fx.NeoHookean(c10=0.5), temperature=150.0,
+                    heat=fx.Cooling(POLYMER, laws, unit="C", tolerance=2e-3), loads=[fx.Pressure("inner", name="air")],
+                    supports=[fx.Clamped("neck"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])
+    path = fx.Process(made).run([fx.Stage("wait", duration=2.0)], progress=False, accuracy="draft")
+    wanted = exact.series(SLAB, 150.0, h, air, DEPTHS, [2.0])
+    assert at_times(path, [2.0], (10.0, 0.0, -20.0)) == pytest.approx(wanted, abs=0.1)

@@ -678,7 +678,8 @@ class Path:
             raise InputError(f"Path.temperature: depth = {depth!r}: must be numbers from 0 to 1, one or one for each"
                              f" point, of a sheet in three dimensions")
         with self.record.segment(state).problem.state_context(state) as problem:
-            return problem.temperature.at_points(problem.followed(at), depths)
+            at = problem.forms.nearest(at) if in_space else problem.followed(at)       # triangles are chords
+            return problem.temperature.at_points(at, depths)
 
     def tool_forces(self) -> dict[str, np.ndarray]:
         """Return the force of the body on each tool in all states.

@@ -117,7 +117,8 @@ def temperature(value: float, *, at: Sequence[float], depth: float | None = None
             raise InputError(f"temperature = {wanted:g}: depth = {depth!r}: is for a sheet in three dimensions: a point"
                              f" of a section has its depth in Z")
         point = as_points("temperature: at", [at], 3 if in_space and not scene.mesh.flat else 2)
-        quantity = PointTemperature(problem, found[0], problem.followed(point), depth)
+        point = problem.forms.nearest(point) if in_space else problem.followed(point)
+        quantity = PointTemperature(problem, found[0], point, depth)
         quantity.value(None, problem.control)                # the point must lie in the body
         return quantity
     return Target("temperature", wanted, bind)
