@@ -174,7 +174,7 @@ def main():
     options = parser("warm_tray", __doc__)
     options.add_argument("--size", type=float, default=8.0, help="size of the triangles, mm")
     args = options.parse_args()
-    size, cases = (20.0, CASES[:1]) if args.quick else (args.size, CASES)
+    size, cases = (32.0, CASES[:1]) if args.quick else (args.size, CASES)
     summary = {"base_wall_mm": {}, "corner_wall_mm": {}, "cost": {}}
     for case in cases:
         path = tray(case, size)

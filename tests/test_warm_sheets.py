@@ -148,6 +148,7 @@ def test_energy_balance_with_heat_and_relaxation():
     assert min(work["friction"][-1], work["dissipated_energy"][-1], work["heat"][-1]) > 0.01 * size
 
 
+@pytest.mark.thorough
 def test_warm_tray_quick(tmp_path):
     """The demo ends; both faces differ, the tray's base is thicker than its corner, and it sets within the hold."""
     found = summary("warm_tray", tmp_path, "--quick")

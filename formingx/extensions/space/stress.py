@@ -37,6 +37,7 @@ class SheetStress(ColumnTable):
         wall: wall of the sheet in this state (`SheetWall`).
         depth: depth of the stresses, from 0 at the bottom (inner) face to 1 at the top (outer) face; None: means.
         comm: MPI communicator.
+        draw: function of a file and of values of the triangles, shape (m,), that draws the part coloured by them.
     """
 
     principal: np.ndarray
