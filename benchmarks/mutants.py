@@ -190,7 +190,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("extensions/space/surface.py", "ufl.inner(f1, f2) / l1, 0]", "0.9 * ufl.inner(f1, f2) / l1, 0]", "space"),
     ("extensions/space/surface.py", "l2 = 1 / ufl.sqrt(l1)", "l2 = 1 / l1", "space"),
     ("extensions/space/pressure_on_tools.py", "- side * size * n", "", "friction_in_space"),
-    ("extensions/space/pressure_on_tools.py", "h * (u - a) for h, u, a", "0 * h * (u - a) for h, u, a",
+    ("extensions/space/pressure_on_tools.py", "h * further[i] for i, h", "0 * h * further[i] for i, h",
      "friction_in_space"),
     ("extensions/space/lagged_friction.py", "dg = np.eye(3) - outer(n, n) - bends", "dg = np.eye(3) - outer(n, n)",
      "friction_in_space"),
