@@ -373,7 +373,8 @@ class FaceContact:
     @property
     def _reference_penalty(self) -> float:
         """Penalty of the contact in the reference configuration, stress/length."""
-        return self.contact.penalty * self._solid.stress * self.thickness / self.reference_length**2
+        reference = self.contact.penalty * self._solid.stress / self.thickness
+        return reference * (self.thickness / self.reference_length) ** 2
 
     def _law(self, penalty: np.ndarray | float) -> Any:
         """Return the contact law at the points; penalty: current over reference penalty, shape () or (n,)."""
