@@ -111,7 +111,7 @@ class LaggedApproach(Approach):
             return False
         a, b = face.positions(old, old_control), face.positions(new, control)
         free = face.history.distance <= -law.theta
-        rows = np.flatnonzero(free & np.isfinite(law.entries(a, b, law.distance(b) > -law.theta)))
+        rows = np.flatnonzero(law.enter(a, b, free, law.distance(b) > -law.theta))
         found = False
         if len(rows):
             sides = (law.tool.distances(x[rows]).normal for x in (a, b))
@@ -192,7 +192,7 @@ class LaggedApproach(Approach):
         old, x, theta = variables.history, face.positions(fields, control), face.law.theta
         late = face.law.distance(x) > LIMITS.negligible_gap * face.reference_length
         if face.law.sticks:                                 # also behind a thin part of the tool
-            late = np.isfinite(face.law.entries(old.position, x, late))
+            late = face.law.enter(old.position, x, old.distance <= -theta, late)
         late &= old.distance <= -theta
         found = bool(combined(self._comm, int(late.sum()), MPI.SUM))
         if found:

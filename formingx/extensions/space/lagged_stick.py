@@ -90,40 +90,54 @@ class LaggedStick(ContactLaw):
             self._found = [(x.copy(), found), *self._found[:2]]
         return found
 
-    def entries(self, a: np.ndarray, b: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    def entries(self, a: np.ndarray, b: np.ndarray, free: np.ndarray, ends: np.ndarray) -> np.ndarray:
         """Return where straight paths enter the tool, as shares of the paths, shape (n,); inf for paths outside it.
 
-        The distance from the tool is a safe advance along a path, so no thin part is passed over. a, b: start (outside
-        the tool) and end, shape (n, 3), length. ends: mask of paths that end in the tool or on it, shape (n,).
+        a, b: start (outside the tool) and end, shape (n, 3), length. free: mask of the paths that are examined, the
+        others have inf. ends: mask of paths that end in the tool or on it, shape (n,).
         """
-        found: np.ndarray = np.where(ends, 1.0, np.inf)
-        low: np.ndarray
-        high: np.ndarray
-        active: np.ndarray
+        hit, low, high = self._bracketed_entries(a, b, free, ends)
+        found: np.ndarray = np.where(free & ends, 1.0, np.inf)
+        way = (b - a)[hit]
+        for _ in range(_BISECTIONS):
+            middle = (low + high) / 2
+            inside = self.tool.signed_distance(a[hit] + middle[:, None] * way) > 0
+            low, high = np.where(inside, low, middle), np.where(inside, middle, high)
+        found[hit] = high
+        return found
+
+    def enter(self, a: np.ndarray, b: np.ndarray, free: np.ndarray, ends: np.ndarray) -> np.ndarray:
+        """Return the mask of the straight paths that enter the tool, shape (n,); the arguments are those of `entries`.
+        """
+        found: np.ndarray = free & ends
+        found[self._bracketed_entries(a, b, free, ends)[0]] = True
+        return found
+
+    def _bracketed_entries(self, a: np.ndarray, b: np.ndarray, free: np.ndarray,
+                           ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return the numbers of paths that enter the tool, and shares of them before and after, shape (m,) each.
+
+        The distance from the tool is a safe advance along a path, so no thin part is passed over.
+        """
         length = np.linalg.norm(b - a, axis=1)
-        rows = np.flatnonzero((ends | (length > -self.distance(a) - self.distance(b))) & (length > 0))
-        if not len(rows):
-            return found
-        a, way, length = a[rows], (b - a)[rows], length[rows]
-        low, high, active = np.zeros(len(rows)), np.full(len(rows), np.inf), np.ones(len(rows), dtype=bool)
+        rows = np.flatnonzero(free & (ends | (length > -self.distance(a) - self.distance(b))) & (length > 0))
+        start, way, length = a[rows], (b - a)[rows], length[rows]
+        low: np.ndarray = np.zeros(len(rows))
+        high: np.ndarray = np.full(len(rows), np.inf)
+        active: np.ndarray = np.arange(len(rows))
         for _ in range(_ADVANCES):
-            d = self.tool.signed_distance(a + low[:, None] * way)
-            inside = active & (d > 0)
-            high[inside] = low[inside]
-            active &= ~inside & (low < 1)
-            if not active.any():
+            if not len(active):
                 break
-            step = np.maximum(-d, self.theta) / length
-            low = np.where(active, np.minimum(low + step, 1.0), low)
+            d = self.tool.signed_distance(start[active] + low[active, None] * way[active])
+            inside = d > 0
+            high[active[inside]] = low[active[inside]]
+            active, d = active[~inside], d[~inside]
+            d, active = d[low[active] < 1], active[low[active] < 1]
+            low[active] = np.minimum(low[active] + np.maximum(-d, self.theta) / length[active], 1.0)
         low = np.where(np.isfinite(high), np.maximum(high - self.theta / length, 0.0), 0.0)
         high = np.where(np.isfinite(high), high, np.where(ends[rows], 1.0, np.inf))
-        hit = np.flatnonzero(np.isfinite(high))
-        for _ in range(_BISECTIONS):
-            middle = (low[hit] + high[hit]) / 2
-            inside = self.tool.signed_distance(a[hit] + middle[:, None] * way[hit]) > 0
-            low[hit], high[hit] = np.where(inside, low[hit], middle), np.where(inside, middle, high[hit])
-        found[rows] = high
-        return found
+        hit = np.isfinite(high)
+        return rows[hit], low[hit], high[hit]
 
     def start(self, x: np.ndarray) -> ContactHistory:
         """Return the history variables at x, shape (n, 3), length; points inside the tool stick there."""
@@ -156,7 +170,7 @@ class LaggedStick(ContactLaw):
         points that stick already, shape (n,).
         """
         d = self.distance(x)
-        share = np.where(sticking, np.inf, self.entries(old.position, x, d > -self.theta))
+        share = self.entries(old.position, x, ~sticking, d > -self.theta)
         new = np.isfinite(share)
         position = np.where(sticking[:, None], old.position, x)
         position[new] = old.position[new] + share[new, None] * (x - old.position)[new]
