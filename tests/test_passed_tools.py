@@ -4,6 +4,7 @@ from time import process_time
 
 import numpy as np
 import pytest
+from conftest import run_json
 
 import formingx as fx
 from formingx.extensions.space.lagged_steps import LaggedApproach
@@ -131,3 +132,18 @@ def test_blade_does_not_pass_between_the_nodes_of_a_tube(on, part):
         assert x.max() == pytest.approx(15.0 + 6.0 - 6.0 + 8.0, abs=1.0)
     elif part == "quarter":
         assert x.max() == pytest.approx(16.6 - 8.0, abs=0.1)
+
+
+@pytest.mark.thorough
+def test_blade_stops_at_the_same_place_on_two_ranks():
+    script = """
+import json, sys
+sys.path.insert(0, "tests")
+from test_passed_tools import tube_and_pin
+path, text = tube_and_pin(0.5, "outer", "quarter")
+found = path["pin_travel"].tolist()
+if path.problem.comm.rank == 0:
+    print(json.dumps(found))
+"""
+    one, two = run_json(script, 1), run_json(script, 2)
+    assert two == pytest.approx(one, rel=1e-9) and one[-1] < 8.0
