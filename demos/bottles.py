@@ -65,7 +65,7 @@ def wall_area(wall, z):
     return float(np.sum(np.diff(found["arc_length"]) * (h[1:] + h[:-1]) / 2))
 
 
-def draw_states(path, states, file, grid=None):
+def draw_states(path, states, file, grid=None, curves=None):
     """Draw the whole body in some states side by side, with the wall over the original one.
 
     Args:
@@ -73,6 +73,7 @@ def draw_states(path, states, file, grid=None):
         states: {title: state}.
         file: the picture.
         grid: size of printed squares, or None.
+        curves: function that draws curves into one more plot on the left, or None.
     """
     with TemporaryDirectory() as folder:
         pictures = []
@@ -80,8 +81,10 @@ def draw_states(path, states, file, grid=None):
             path.view3d(Path(folder) / f"{k}.png", state, grid=grid)
             pictures.append(Path(folder) / f"{k}.png")
         if COMM.rank == 0:
-            figure, axes = figures.figure(len(states), width=4.6)
-            for axis, title, picture in zip(axes, states, pictures):
+            figure, axes = figures.figure(len(states) + bool(curves), width=4.6)
+            if curves:
+                curves(axes[0])
+            for axis, title, picture in zip(axes[bool(curves):], states, pictures):
                 axis.imshow(imread(picture))
                 axis.set_title(title)
                 axis.axis("off")

@@ -104,6 +104,18 @@ def round_solid(rows, layers):
     return run(scene, True, ROUND_FILL)
 
 
+def draw_history(path, axes):
+    """Draw the force of the rod, and the pressure of the air, over the time."""
+    time = path["process_time"]
+    axes.plot(time, path["rod_force"], "C0")
+    axes.set(xlabel="time (s)", title="force of the rod, pressure of the air")
+    axes.set_ylabel("force of the rod (N)", color="C0")
+    right = axes.twinx()
+    right.plot(time, path["air_pressure"], "C3")
+    right.set(ylim=(0, None))
+    right.set_ylabel("pressure (MPa)", color="C3")
+
+
 def main():
     args = parser("stretch_blow", __doc__).parse_args()
     elements, solid_elements = ((20, 5), (30, 1)) if args.quick else ((64, 16), (120, 2))
@@ -124,7 +136,7 @@ def main():
     path.to_csv(args.out / "stretch_blow.csv")
     if not args.quick:
         draw_states(path, {"stretched by the rod": path.state(stage="stretch"), "blown": path.last},
-                    args.out / "stretch_blow.png", grid=8.25)
+                    args.out / "stretch_blow.png", grid=8.25, curves=lambda axes: draw_history(path, axes))
     summarise(args.out, {**summary, "versions": files.versions()})
 
 
