@@ -72,3 +72,12 @@ def test_convergence_needs_residual_and_correction():
     assert not met([1e-4, 3e-8, 2e-8], 1e-7, before=4e-7)      # the residual still does: a point lets go
     assert not met([1e-4, 3e-5, 2e-5], 1e-9)          # stalled far from it
     assert met([1e-2, 1e-6, 1e-12], 0.9)              # a residual at round-off, of a stiff penalty
+
+
+@pytest.mark.parametrize("chord", [False, True])
+def test_convergence_after_an_iteration_without_residual_or_correction(chord):
+    """Such as an unloaded body whose first guess is in equilibrium, and whose volume is then corrected."""
+    tolerances = fx.Tolerances()
+    assert not tolerances.converged([0.0, 1e-3], [0.0, 0.0, 1e-3], chord)
+    assert not tolerances.converged([0.0, 1e-3], [1e-3, 0.0, 1e-3], chord)
+    assert tolerances.converged([0.0, 1e-14], [0.0, 0.0, 1e-14], chord)

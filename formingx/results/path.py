@@ -275,12 +275,16 @@ class Path:
         `bound` is the quantity of the target in the problem. A stage that controls one is an InputError, no convergence
         a ConvergenceError.
         """
-        if segment.problem.has_history:                      # states between them depend on the history
-            found = self._run_to(segment, left, right, target, bound)
-        else:
-            found = segment.curve.state_at_target(left, right, bound, target)
-            found.stage, found.setting = left.stage, left.setting
-            found.measures = self._measures(segment, found)
+        try:
+            if segment.problem.has_history:                  # states between them depend on the history
+                found = self._run_to(segment, left, right, target, bound)
+            else:
+                found = segment.curve.state_at_value(left, right, bound, target.value)
+                found.stage, found.setting = left.stage, left.setting
+                found.measures = self._measures(segment, found)
+        except (ConvergenceError, Failure) as error:
+            raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
+                                   f" {error}; run with intermediate=[...] to have one") from None
         segment.curve.spent()
         return found
 
@@ -288,8 +292,7 @@ class Path:
         """Return the state between two successive states that meets a target, by a run from the first of them, `left`.
 
         The steps of this run update the history variables. `right` is the second state, `segment` contains both, and
-        `bound` is the output quantity of the target. An InputError is raised if the stage controls an output quantity,
-        a ConvergenceError if no state is found.
+        `bound` is the output quantity of the target. A stage that controls one is an InputError.
         """
         if left.time < right.time and not left.setting["rate"][-1]:
             raise InputError(f"the path passes {target} between two of its states, in a stage that controls an output"
@@ -302,11 +305,7 @@ class Path:
         data: dict[str, Any] = next((s.stepping for s in reversed(before) if s.stepping and s.setting == left.setting),
                                     {})
         step, given = StepControl(**data.get("step", {})), {k: v for k, v in data.items() if k == "accuracy"}
-        try:
-            Run(record, [(target, bound)], step, **given).follow(200, False, None)
-        except (ConvergenceError, Failure) as error:
-            raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
-                                   f" {error}; run with intermediate=[...] to have one") from None
+        Run(record, [(target, bound)], step, **given).follow(200, False, None)
         for k in range(2, len(record.states) + 1):
             self._fill(segment, record.states[:k])
         return record.last

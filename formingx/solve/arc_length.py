@@ -11,7 +11,6 @@ import numpy as np
 from petsc4py import PETSc
 
 from ..errors import ConvergenceError
-from ..measures.targets import Target
 from .equations import Array, Attempt, Constraint, Equations, Quantity
 from .newton import BorderedNewton, Failure, Iteration, Tolerances, fixed, relative
 from .state import State
@@ -350,17 +349,6 @@ class Curve:
         Raise `Failure` if Newton's method fails, or if an element is inverted."""
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
-
-    def state_at_target(self, a: State, b: State, quantity: Quantity, target: Target) -> State:
-        """Return the state of kind "target" between two states that meets a target.
-
-        Raise a `ConvergenceError` that says how to set the target before the run if no such state was found.
-        """
-        try:
-            return self.state_at_value(a, b, quantity, target.value)
-        except Failure as failure:
-            raise ConvergenceError(f"the path passes {target} between two of its states, but no state was found there:"
-                                   f" {failure.reason}; run with intermediate=[...] to have one") from None
 
     def limit_point(self, a: State, b: State) -> State:
         """Return the state of kind "limit point" between two states at which the control is stationary.

@@ -237,9 +237,10 @@ class Tolerances:
         if chord:
             if residual == 0:                                # in the unloaded reference configuration
                 return True
-            ahead = 2 * last * max(residual / residuals[-2], last / before)     # linear convergence, doubled
+            ratio = max(residual / (residuals[-2] or residual), last / (before or last or 1.0))
+            ahead = 2 * last * ratio                        # linear convergence, doubled
             return ahead < self.correction and residual < self.residual
-        ahead = last * min(1.0, last / before) ** 2
+        ahead = last * min(1.0, last / (before or last or 1.0)) ** 2
         if ahead < self.correction and residual < self.residual:
             return True
         if last < self.correction and residual > 0.3 * residuals[-2]:
