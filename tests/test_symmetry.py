@@ -180,7 +180,8 @@ def test_report_in_space_draws_the_whole_part_and_its_tool(parts, tmp_path):
     from formingx.extensions.space import show
     path = parts["quarter"]
     drawn = show._mesh(path, report_data.of_path(path), UNITS)
-    assert list(drawn["fields"]) == ["wall, mm", "wall / original"] and len(drawn["tools"][0]["images"]) == 1
+    assert list(drawn["fields"]) == ["wall, mm", "wall / original", "larger stress, MPa"]
+    assert len(drawn["tools"][0]["images"]) == 1
     assert len(drawn["points"]) == len(drawn["fields"]["wall, mm"]) == len(path)
     assert min(drawn["fields"]["wall, mm"][-1]) == pytest.approx(path.wall().at_nodes.min(), rel=1e-4)
     text = path.report(tmp_path / "tray.html", units=UNITS, density=1.05).read_text()

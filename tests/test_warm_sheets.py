@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from test_demos import summary
+from test_files import drawn
 from test_friction_in_space import formed_in_cup, pushed
 from test_heat_columns import HELD, POLYMER, sheet
 
@@ -206,3 +207,19 @@ def test_stresses_of_an_energy_by_depth():
     J = float(limit(T[-1]))
     wanted = 0.5 * J / (J - (squared.sum(1) + across[:, 0] - 3))[:, None] * (squared - across)
     assert path.stress(depth=1.0).principal == pytest.approx(wanted, rel=1e-6)
+
+
+@pytest.mark.thorough
+def test_an_animation_and_a_picture_of_stresses(tmp_path):
+    """Frames of a sheet with its plug, all of one size; a picture coloured by stress; the report has both fields."""
+    from PIL import Image
+    path = fx.trace(pushed(0.3, 0.3), until=fx.travel(0.5), progress=False)
+    path.animate(tmp_path / "run.gif", frames=3, seconds=1.0)
+    with Image.open(tmp_path / "run.gif") as picture:
+        frames = [np.asarray(picture.convert("RGB")) for k in range(picture.n_frames) if picture.seek(k) is None]
+    assert len(frames) == 3 and not np.array_equal(frames[0], frames[2])
+    path.stress().view(tmp_path / "stress.png")
+    with Image.open(tmp_path / "stress.png") as picture:
+        assert len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0)) > 20
+    shown = drawn(path.report(tmp_path / "report.html"))
+    assert list(shown["runs"][0]["mesh"]["fields"]) == ["wall", "wall / original", "larger stress"]

@@ -23,7 +23,7 @@ def frame_pictures(path: Any, frames: int) -> Callable[[], list[Any]]:
     The frames are evenly spaced over the process. All have the same view and the same colours of the wall.
     """
     tooling, walls, travels, words = Tooling.of_problem(path.problem), [], [], []
-    for a, b, fraction in spread(path, frames, [None] * len(path)):
+    for a, b, fraction in spread(path, frames, sheet=False):
         state = between(path.record, a, b, fraction)
         walls.append(wall_of(path, state))
         travels.append(tooling.travels(state.setting, state.control))

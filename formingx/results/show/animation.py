@@ -55,7 +55,7 @@ def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NO
 def _section_pictures(path: Any, frames: int, units: Units) -> Callable[[], list[Any]]:
     """Return a function that draws the frames of a section on rank 0; collective."""
     shapes, tools, now, tooling, shown = [], [], [], Tooling.of_problem(path.problem), columns_of_stages(path)
-    for a, b, fraction in spread(path, frames, [path.profile(state) for state in path.states]):
+    for a, b, fraction in spread(path, frames):
         interpolated = between(path.record, a, b, fraction)
         shapes.append(path.profile(interpolated))
         names = shown[b.stage]
@@ -87,11 +87,12 @@ def has_image_at_axis(scene: Any) -> bool:
     return ring or any(plane.axis == 0 and abs(plane.position) <= near for plane in scene.symmetry.planes)
 
 
-def spread(path: Any, frames: int, profiles: list[Any]) -> list[tuple[Any, Any, float]]:
+def spread(path: Any, frames: int, sheet: bool = True) -> list[tuple[Any, Any, float]]:
     """Return (state, next state, position 0 to 1) of frames evenly spaced over the progress of the process.
 
-    profiles: the profile of each state, or None.
+    sheet: True for a sheet in a section, whose motion counts in a run without time.
     """
+    profiles = [path.profile(state) if sheet else None for state in path.states]
     done = progress({c: path[c] for c in path.columns}, profiles)
     found = []
     for s in np.linspace(0, done[-1], frames) if frames > 1 else done[-1:]:
