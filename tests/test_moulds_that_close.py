@@ -367,6 +367,26 @@ def test_tube_sags_then_halves_close_then_air_blows():
     assert path["enclosed_volume"][-1] == pytest.approx(5.44e5, rel=0.02)
 
 
+@pytest.mark.slow
+def test_parts_that_are_blown_round_the_eye_of_a_handle_are_reported():
+    """A pillar pinches the tube at its side; what is blown above and below it meets behind it."""
+    pillar = fx.tools.swept(fx.Tool([(0, -22), (3.5, -22), (3.5, 22), (0, 22)], [0, 3, 3, 0]), half=(40.0, 3.5),
+                            corner=3.0).moved(x=40.0, y=11.5, z=-100.0)
+    tool = fx.tools.union(fx.tools.half(BOTTLE), pillar).moved(x=40.0)
+    mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(52, 24), part="half")
+    closing = fx.Scene(
+        mesh=mesh, thickness=2.5, materials=MELT, model=fx.Membrane(wrinkles=0.01),
+        supports=[fx.Clamped("neck"), fx.Symmetry("end", "z", guide=True), *SYMMETRIES["half"]],
+        loads=[fx.Pressure("inner", name="air", above=-180.0)],
+        contacts=[fx.Contact("outer", tool, "stick", direction=(-1, 0, 0), name="mould")])
+    path = fx.Process(closing).run([
+        fx.Stage("pre-blow", control="air", until=fx.pressure(0.002)),
+        fx.Stage("close", control="mould", until=fx.travel(40.0)),
+        fx.Stage("blow", control="air", until=fx.pressure(0.3))], progress=False)
+    found = [finding for finding in crossing.crossing_layers(path) if "pass through each other" in finding.text]
+    assert found and found[0].severity == "serious"
+
+
 @pytest.mark.thorough
 def test_k_bkz_tube_is_the_solid_ring_in_plane_strain():
     """A ring of a thin wall in plane strain, blown by a constant flow: the pressure by time of the solid, H/R apart."""
@@ -401,6 +421,11 @@ def test_layers_that_cross_are_reported(monkeypatch):
     flat = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, -1], [1, 1, 1], [2, 1, 1.0]])
     assert crossing.crossings(flat, np.array([[0, 1, 2], [3, 4, 5]]), 0.1) == pytest.approx(
         np.array([[1, 1, 0], [1.5, 1, 0]]))
+    for thickness, many in ((0.1, 1), (3.0, 0)):                                # by 1; layers at a pinch lie in the wall
+        two = replace(wall, reference_points=flat + [10.0, 0, 0], deformed_points=flat + [10.0, 0, 0],
+                      triangles=np.array([[0, 1, 2], [3, 4, 5]]), layers={"sheet": np.full(2, thickness)})
+        monkeypatch.setattr(path, "wall", lambda two=two: two)
+        assert len(list(crossing.crossing_layers(path))) == many
     above = flat + np.repeat([[0.0, 0, 0], [0, 0, 3]], 3, axis=0)
     assert len(crossing.crossings(above, np.array([[0, 1, 2], [3, 4, 5]]), 0.1)) == 0
 
