@@ -18,6 +18,8 @@ from .surface import smaller_stress
 
 _UNBALANCED = 0.02         # share of the resultant of the loads that supports and tools may miss
 
+_LEAST_RESULTANT = 1e-3    # of loads, over the sum of the forces at all nodes, to which missed forces are compared
+
 _LARGE_WALL_ERROR = 0.2
 """Estimated error of the minimum wall over this wall above which a run warns of it."""
 
@@ -77,11 +79,13 @@ def unbalanced_loads(path: Any) -> Iterator[Finding]:
         works = sum(problem.assemble(forms.compile(work)) for work in forms.load_works)
         loads, supports = (combined(problem.comm, values[nodes].sum(0)) for values in (works / forms.length,
                                                                                        scale * held))
+        each = combined(problem.comm, float(np.linalg.norm(works[nodes] / forms.length, axis=1).sum()))
         tools = sum(resultants.force(face, problem.x.array_r[:problem.n_owned], control)
                     for face in problem.active_contacts)
     missed, planes = tools - supports - loads, [plane.axis for plane in path.scene.symmetry.planes]
     missed[planes] = loads[planes] = 0.0                      # balanced by the mirror image
-    share = float(np.linalg.norm(missed)) / max(float(np.linalg.norm(loads)), 1e-300)
+    largest = max(float(np.linalg.norm(loads)), _LEAST_RESULTANT * each, 1e-300)         # in a tube they balance
+    share = float(np.linalg.norm(missed)) / largest
     if share > _UNBALANCED:
         yield Finding("warning", "forces", f"the forces on supports and tools miss the resultant of the loads by"
                       f" {percent(share)} in the last state: do not use a force. Use smaller triangles where the sheet"
