@@ -421,7 +421,7 @@ def test_layers_that_cross_are_reported(monkeypatch):
     flat = np.array([[0, 0, 0], [4, 0, 0], [0, 4, 0], [1, 1, -1], [1, 1, 1], [2, 1, 1.0]])
     assert crossing.crossings(flat, np.array([[0, 1, 2], [3, 4, 5]]), 0.1) == pytest.approx(
         np.array([[1, 1, 0], [1.5, 1, 0]]))
-    for thickness, many in ((0.1, 1), (3.0, 0)):                                # by 1; layers at a pinch lie in the wall
+    for thickness, many in ((0.1, 1), (3.0, 0)):                      # by 1; layers at a pinch lie in the wall
         two = replace(wall, reference_points=flat + [10.0, 0, 0], deformed_points=flat + [10.0, 0, 0],
                       triangles=np.array([[0, 1, 2], [3, 4, 5]]), layers={"sheet": np.full(2, thickness)})
         monkeypatch.setattr(path, "wall", lambda two=two: two)
