@@ -158,3 +158,18 @@ def test_forces_that_miss_the_loads_are_told(monkeypatch):
     monkeypatch.setattr(Surface, "carried_forces", lambda self, face, fields, control: 0.0)
     found = cup("none", 0.15).findings()
     assert any("miss the resultant of the loads by 8" in finding.text for finding in found)
+
+
+def test_half_of_two_balloons_stops_at_its_plane_of_symmetry():
+    """Two balloons with a waist would press at each other; the model of one would pass through its mirror image."""
+    neck, turn = 0.2, np.pi - np.arcsin(0.2)
+    t = np.linspace(-turn, turn, 40)
+    outline = np.column_stack([np.cos(turn) * -1 + np.cos(t), np.sin(t)])
+    sheet = fx.mesh.sheet(outline.tolist(), size=0.25, names=["rim"] * (len(t) - 1) + ["x0"])
+    scene = fx.Scene(mesh=sheet, thickness=0.01, materials=fx.MooneyRivlin(c10=1.0, c01=0.2), supports=[
+        fx.SimplySupported("rim"), fx.Symmetry("x0", "x")], loads=[fx.Pressure("bottom")])
+    low, high = (fx.displacement(h, at=(np.sqrt(1 - neck**2), 0.0), component="z") for h in (0.3, 2.0))
+    path = fx.trace(scene, until=low, progress=False)
+    assert not any("plane of symmetry" in finding.text for finding in path.findings())
+    with pytest.raises(fx.ConvergenceError, match="crosses the plane of symmetry x = .* where its mirror image is"):
+        fx.trace(scene, until=high, progress=False)

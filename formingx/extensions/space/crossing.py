@@ -20,13 +20,13 @@ _DEPTH_OF_WALL, _DEPTH_OF_EDGE = 0.5, 0.4
 
 @register("end")
 def crossing_layers(path: Any) -> Iterator[Finding]:
-    """Yield a finding if layers of a curved surface cross each other or a plane of symmetry at the end; collective.
+    """Yield a finding if layers of a surface cross each other or a plane of symmetry at the end; collective.
 
     A membrane has no contact with itself. Layers that meet need a tool between them, such as the parting plane of half
     moulds, or a plane of symmetry.
     """
     scene = path.problem.scene
-    if scene.kinematics.components != 3 or scene.mesh.flat:
+    if scene.kinematics.components != 3:
         return
     wall = path.wall()
     x, size = wall.deformed_points, float(np.ptp(wall.deformed_points, axis=0).max())
