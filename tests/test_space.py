@@ -527,13 +527,13 @@ def test_tools_across_a_plane_of_symmetry_are_found(move, direction, told):
 
 
 @pytest.mark.parametrize("size, friction, told", [
-    (0.15, "none", False), (0.3, "none", True), (0.3, 0.3, True), (0.3, "stick", False)])
+    (0.15, "none", False), (0.3, "none", True), (0.3, 0.3, True), (0.3, "stick", True)])
 def test_fillets_smaller_than_triangles_are_found(size, friction, told, caplog):
-    """A check and a run warn of a fillet below the median edge of the triangles, where the sheet slides."""
+    """A check and a run warn of a fillet below the median edge of the triangles."""
     scene = trough(size, friction=friction)
     fx.trace(scene, until=fx.pressure(0.01), progress=False)
     for text in (str(fx.check(scene)), caplog.text):
-        assert ("it has a fillet of radius 0.2, and half of the edges of the triangles are longer" in text) == told
+        assert ("it has fillets of radius 0.2, and half of the edges of the triangles are longer" in text) == told
 
 
 def _drafted():
@@ -638,7 +638,7 @@ def test_a_sheet_that_sticks_to_a_flange_is_not_in_compression():
                      contacts=[fx.Contact("bottom", mould)])
     path = fx.trace(scene, until=fx.pressure(0.05), progress=False)
     assert path.wall().stretches.min() < 1 - 1e-7 and not path.wall().wrinkled.any()
-    assert {finding.about for finding in path.findings()} <= {"wall"}      # its triangles are coarse
+    assert not any("compression" in finding.text for finding in path.findings())     # its triangles are coarse
 
 
 @pytest.mark.parametrize("wrinkles", [None, 0.01])

@@ -5,13 +5,11 @@ from typing import Any
 
 import numpy as np
 
-from ... import _compat
 from ...contact import resultants
 from ...findings import Finding, percent, register
 from ...mesh.nodes import nearest
 from ...physics.supports import Symmetry
 from ...ranks import combined, gathered
-from ...tools.pieces import Arc
 from ...values.tolerances import NEGLIGIBLE
 from .solid_tool import Swept
 from .surface import smaller_stress
@@ -113,31 +111,6 @@ def coarse_triangles(body: Any) -> Iterator[Finding]:
                       f" the middle of the sheet is {body.format(reach, 'travel', 3)} from its held edges: pressures"
                       f" will be off by several per cent. Use fx.mesh.sheet(..., size={reach / 10:.2g}), or"
                       f" adapt_mesh=True")
-
-
-@register("start")
-def coarse_fillets(body: Any) -> Iterator[Finding]:
-    """Yield a finding for each tool with a concave fillet below the length of the edges that slide on it; collective.
-
-    A fillet is reported if its radius is below the median edge of triangles. The direction of the pressure then changes
-    by about a radian from triangle to triangle. Newton's method may diverge, or the sheet snaps.
-    """
-    scene = body.scene
-    tools = [contact for contact in scene.contacts if isinstance(contact.tool, Swept) and not contact.sticks]
-    if scene.kinematics.components != 3 or not tools:
-        return
-    mesh = scene.mesh
-    corners = mesh.domain.geometry.x[_compat.cell_nodes(mesh.domain)]
-    edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-    length = float(np.median(gathered(mesh.comm, edges.ravel())))
-    for contact in tools:
-        profile = contact.tool.profile
-        radius = min((piece.radius for piece in profile.pieces if isinstance(piece, Arc) and piece.radius > 0
-                      and profile.signed_distance(piece.centre[None])[0] < 0), default=np.inf)
-        if radius < length:
-            yield Finding("warning", repr(contact), f"it has a fillet of radius {radius:.4g}, and half of the"
-                          f" edges of the triangles are longer than {length:.4g}: a sheet that slides may not converge."
-                          f" Use triangles of size {radius:.4g} or less, or adapt_mesh=True.")
 
 
 @register("start")

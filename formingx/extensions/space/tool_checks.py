@@ -7,7 +7,10 @@ import numpy as np
 
 from ...findings import Finding, percent, register
 from ...ranks import gathered
+from ...tools.pieces import Arc
 from ...values.tolerances import LARGE_ERROR
+from .passed_tools import surface_points
+from .solid_tool import Swept
 from .triangulated import Triangulated
 from .union import Union
 
@@ -15,10 +18,14 @@ _FILLET_SHARE = 2e-3       # of the points of a tool over the sheet, from which 
 _COARSE_WALL = 0.02        # error of the volume of a sheet by its triangles that is reported
 
 
+def _parts(tool: Any) -> list[Any]:
+    """Return the parts of a union, or the tool itself, as a list."""
+    return [part.moved(*tool.shift) for part in tool.parts] if isinstance(tool, Union) else [tool]
+
+
 def files_of(tool: Any) -> list[Triangulated]:
     """Return the parts of a tool that were read from files."""
-    parts = tool.parts if isinstance(tool, Union) else [tool]
-    return [part for part in parts if isinstance(part, Triangulated)]
+    return [part for part in _parts(tool) if isinstance(part, Triangulated)]
 
 
 @register("start")
@@ -40,33 +47,52 @@ def unresolved_files(body: Any) -> Iterator[Finding]:
 
 
 @register("start")
-def coarse_fillets_of_files(body: Any) -> Iterator[Finding]:
-    """Yield a finding for each tool with a concave fillet smaller than the triangles of the sheet; collective."""
-    scene = body.scene
-    if scene.kinematics.components != 3 or not scene.mesh.flat:
-        return
-    from scipy.spatial import cKDTree
+def coarse_fillets(body: Any) -> Iterator[Finding]:
+    """Yield a finding for each tool with a concave fillet below the median edge of the sheet's triangles; collective.
 
-    from .passed_tools import surface_points
-    nodes, length = gathered(scene.mesh.comm, scene.mesh.domain.geometry.x), _median_edge(scene.mesh)
+    The sheet then turns by about a radian from triangle to triangle.
+    """
+    scene = body.scene
+    if scene.kinematics.components != 3:
+        return
+    length = _median_edge(scene.mesh)
+    nodes = gathered(scene.mesh.comm, scene.mesh.domain.geometry.x) if scene.mesh.flat else None
     for contact in scene.contacts:
-        if not files_of(contact.tool):
-            continue
-        points = surface_points(contact.tool, length / 3, nodes, 0.0)
-        i, j = cKDTree(points).query_pairs(length / 2, output_type="ndarray").T
-        apart = points[j] - points[i]
-        square = (apart**2).sum(1)
-        kept = square > (length / 6) ** 2
-        normal = contact.tool.distances(points).normal
-        bend = ((normal[j] - normal[i])[kept] * apart[kept]).sum(1) / square[kept]     # concave: positive
-        small = bend * length > 1
-        if small.mean() > _FILLET_SHARE:
-            place = points[i[kept][int(np.argmax(bend))]]
-            radius, position = 1 / float(np.median(bend[small])), ", ".join(f"{v:.4g}" for v in place)
-            yield Finding("warning", repr(contact), f"it has fillets of radius {radius:.3g}, as at (x, y, z) ="
-                          f" ({position}), and half of the edges of the triangles are longer than {length:.4g}: the"
-                          f" wall there will be too thick or too thin by tens of per cent. Use triangles of size"
-                          f" {radius:.3g} or less, or adapt_mesh=True.")
+        radius, place = min((_smallest_fillet(part, nodes, length) for part in _parts(contact.tool)),
+                            key=lambda found: found[0])
+        if radius < length:
+            position = "" if place is None else f", as at (x, y, z) = ({', '.join(f'{v:.4g}' for v in place)})"
+            slides = "" if contact.sticks else ", and a sheet that slides may not converge"
+            yield Finding("warning", repr(contact), f"it has fillets of radius {radius:.3g}{position}, and half of the"
+                          f" edges of the triangles are longer than {length:.4g}: the wall there will be too thick or"
+                          f" too thin by tens of per cent{slides}. Use triangles of size {radius:.3g} or less, or"
+                          f" adapt_mesh=True.")
+
+
+def _smallest_fillet(tool: Any, nodes: np.ndarray | None, length: float) -> tuple[float, np.ndarray | None]:
+    """Return the radius of the smallest concave fillet of a tool, length, and a place there, shape (3,), or None.
+
+    nodes: of a flat sheet, shape (n, 3), else None: files are not examined. length: median edge of its triangles.
+    Without a small fillet the radius is inf.
+    """
+    if isinstance(tool, Swept):
+        arcs = (piece for piece in tool.profile.pieces if isinstance(piece, Arc) and piece.radius > 0)
+        concave = [arc.radius for arc in arcs if tool.profile.signed_distance(arc.centre[None])[0] < 0]
+        return min(concave, default=np.inf), None
+    if not isinstance(tool, Triangulated) or nodes is None:
+        return np.inf, None
+    from scipy.spatial import cKDTree
+    points = surface_points(tool, length / 3, nodes, 0.0)
+    i, j = cKDTree(points).query_pairs(length / 2, output_type="ndarray").T
+    apart = points[j] - points[i]
+    square = (apart**2).sum(1)
+    kept = square > (length / 6) ** 2
+    normal = tool.distances(points).normal
+    bend = ((normal[j] - normal[i])[kept] * apart[kept]).sum(1) / square[kept]     # concave: positive
+    small = bend * length > 1
+    if not small.mean() > _FILLET_SHARE:
+        return np.inf, None
+    return 1 / float(np.median(bend[small])), points[i[kept][int(np.argmax(bend))]]
 
 
 @register("start")
