@@ -183,9 +183,12 @@ def test_zones_heat_each_place_by_its_own(tmp_path):
 
 
 def test_a_stage_leaves_a_heater_out():
-    """The heater of an oven stops at the end of its stage, in three dimensions and in a section."""
-    heater = fx.HeatFlux("top", flux=0.02, name="oven")
-    heat = fx.Cooling(POLYMER, [heater], unit="C", tolerance=0.02)
+    """The heaters of an oven stop at the end of its stage, in three dimensions and in a section.
+
+    Both have one name. An unknown name, and the name of another item of the scene, are refused.
+    """
+    heaters = [fx.HeatFlux(face, flux=0.01, name="oven") for face in ("bottom", "top")]
+    heat = fx.Cooling(POLYMER, heaters, unit="C", tolerance=0.02)
     flat = fx.Scene(mesh=fx.mesh.disc(radius=20.0, thickness=1.0, elements=(4, 3)), materials=fx.NeoHookean(c10=0.1),
                     supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")], temperature=20.0, heat=heat,
                     loads=[fx.Pressure("bottom", name="air")])
@@ -196,6 +199,8 @@ def test_a_stage_leaves_a_heater_out():
         assert path.temperature([(3.0, 0.5)], **points)[0] == pytest.approx(wanted, abs=0.2)
     with pytest.raises(fx.InputError, match="'ovn' is not in the scene"):
         fx.Process(scene(heat)).run([fx.Stage("oven", duration=2.0, inactive=["ovn"])])
+    with pytest.raises(fx.InputError, match="an item of the scene is called 'air'"):
+        scene(fx.Cooling(POLYMER, [fx.HeatFlux("top", flux=0.01, name="air")], unit="C"))
 
 
 @pytest.mark.parametrize("boundary, options, words", [

@@ -203,14 +203,16 @@ class Scene:
         return [*self.loads, *self.supports, *self.contacts]
 
     @property
-    def heat_laws(self) -> dict[str, int]:
-        """Named laws of heat of the scene, {name: number}, for `Stage.inactive`.
+    def heat_laws(self) -> dict[str, list[int]]:
+        """Named laws of heat of the scene, {name: numbers of the laws with this name}, for `Stage.inactive`.
 
         The numbers follow those of `items` and of the process time, in the order of `Cooling.boundaries`.
         """
-        laws = [] if self.heat is None else self.heat.boundaries
-        first = len(self.items) + 1
-        return {law.name: first + k for k, law in enumerate(laws) if getattr(law, "name", None)}
+        found: dict[str, list[int]] = {}
+        for k, law in enumerate([] if self.heat is None else self.heat.boundaries, len(self.items) + 1):
+            if getattr(law, "name", None):
+                found.setdefault(law.name, []).append(k)
+        return found
 
     @property
     def drivable(self) -> list[Any]:

@@ -225,8 +225,9 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     """
     caller = stage.label
     laws = scene.heat_laws
-    inactive = sorted({laws[item] for item in stage.inactive if item in laws} | {
-        i for item in stage.inactive if item not in laws
+    named = [item for item in stage.inactive if isinstance(item, str) and item in laws]
+    inactive = sorted({i for item in named for i in laws[item]} | {
+        i for item in stage.inactive if item not in named
         for i in scene.same_tool(scene.number(f"{caller}: inactive", item))})
     driven = [stage.control] if stage.control is not None else [item for item, _ in stage.tables]
     numbers = [scene.number(caller, item) for item in driven]

@@ -51,6 +51,9 @@ class Cooling:
     scheme is of second order in the step. Temperature-dependent constants have their new values in the next step. Steps
     are shortened so that the temperature, too, is accurate in time (`accuracy` of `Process.run`).
 
+    In a section heat flows in both directions, in a sheet in three dimensions through its thickness only
+    (docs/how/warm_tray.md). A law with a name acts in the stages that do not leave it out (`Stage.inactive`).
+
     Args:
         materials: {layer: `ThermalProperties`}, or one for all layers.
         boundaries: list of `Convection`, `Radiation`, `HeatFlux`, `FixedTemperature`, `ContactWithTool` and
@@ -107,6 +110,11 @@ class Cooling:
         if self.work_to_heat and not any(material.internal for material in scene.materials.values()):
             raise InputError(f"Scene: heat: work_to_heat = {self.work_to_heat:g}: no material of the scene dissipates"
                              f" work: give one that relaxes, or leave it out")
+        items = [item.name for item in scene.items if item.name]
+        for law in self.boundaries:
+            if getattr(law, "name", None) in items:
+                raise InputError(f"Cooling: {law!r}: name: an item of the scene is called {law.name!r}: must be another"
+                                 f" name")
         zero = ABSOLUTE_ZERO[self.unit]
         checked_materials(scene.mesh, self.materials)
         checked_boundaries(scene.mesh, [*self.boundaries, *self.contacts_with_tools(scene)], zero)

@@ -255,10 +255,9 @@ class CoolingHistory:
 
     def _inactive_laws(self) -> list[Any]:
         """Return the laws of heat that are inactive in the current stage."""
-        scene, laws = self._problem.scene, self._cooling.boundaries
-        inactive = self._problem.setting.inactive
-        first = len(scene.items) + 1
-        return [laws[number - first] for number in scene.heat_laws.values() if number in inactive]
+        first = len(self._problem.scene.items) + 1
+        return [self._cooling.boundaries[number - first] for number in self._problem.setting.inactive
+                if number >= first]
 
     def _integrate(self, until: float) -> None:
         """Solve the heat equation up to the time `until`, with the body at a fixed position."""
