@@ -223,3 +223,21 @@ def test_an_animation_and_a_picture_of_stresses(tmp_path):
         assert len(np.unique(np.asarray(picture.convert("RGB")).reshape(-1, 3), axis=0)) > 20
     shown = drawn(path.report(tmp_path / "report.html"))
     assert list(shown["runs"][0]["mesh"]["fields"]) == ["wall", "wall / original", "larger stress"]
+
+
+@pytest.mark.thorough
+@pytest.mark.parametrize("material", [
+    fx.Viscoelastic(fx.NeoHookean(c10=MODULUS), [(0.3, 0.1)], shift=fx.Arrhenius(80e3, 60.0, unit="C")),
+    fx.KBKZ([(0.5, 0.05), (0.2, 2.0)], damping=fx.PSM(alpha=14.4, beta=0.05), shift=fx.Arrhenius(80e3, 60.0, unit="C")),
+    fx.Solidification(fx.NeoHookean(c10=MODULUS), modulus=5.0, between=(50.0, 90.0))],
+    ids=["viscoelastic", "K-BKZ", "solidification"])
+def test_an_insulated_sheet_of_one_temperature_is_one_without_heat(material):
+    """Energies and histories at several depths: with one temperature they give the volume of a run without columns."""
+    volumes = []
+    for heat in (fx.Cooling(POLYMER, unit="C"), None):
+        scene = fx.Scene(mesh=sheet(12.0), thickness=1.0, materials=material, temperature=70.0, heat=heat,
+                         supports=HELD, loads=[fx.Pressure("bottom", name="air")])
+        path = fx.Process(scene).run([fx.Stage("blow", control="air", until=fx.pressure(0.01), duration=0.2),
+                                      fx.Stage("hold", duration=0.1)], progress=False, accuracy="draft")
+        volumes.append(path["enclosed_volume"][-1])
+    assert volumes[0] > 100.0 and volumes[0] == pytest.approx(volumes[1], rel=1e-4)
