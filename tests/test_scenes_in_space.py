@@ -173,3 +173,15 @@ def test_half_of_two_balloons_stops_at_its_plane_of_symmetry():
     assert not any("plane of symmetry" in finding.text for finding in path.findings())
     with pytest.raises(fx.ConvergenceError, match="crosses the plane of symmetry x = .* where its mirror image is"):
         fx.trace(scene, until=high, progress=False)
+
+
+def test_the_gap_of_an_untouched_mould_leaves_out_the_held_rim():
+    """The rim lies on the flange, so the smallest gap is that of the nodes next to it."""
+    sheet = fx.mesh.sheet(fx.mesh.circle(1.2, part="quarter"), size=0.3)
+    cup = fx.tools.revolved(fx.Tool([(2.0, 0.0), (1.2, 0.0), (1.1, -0.8), (0.0, -0.8)], [0.0, 0.0, 0.1, 0.0]))
+    scene = fx.Scene(mesh=sheet, thickness=0.01, materials=fx.NeoHookean(c10=1.0), loads=[fx.Pressure("top")],
+                     supports=[fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")],
+                     contacts=[fx.Contact("bottom", cup, "none", name="mould")])
+    path = fx.trace(scene, until=fx.pressure(0.002), progress=False)
+    (text,) = (finding.text for finding in path.findings() if "mould" in finding.about)
+    assert "never touched" in text and "the gap was 0 at" not in text and "and 0 at the end" not in text, text

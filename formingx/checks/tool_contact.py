@@ -79,11 +79,15 @@ def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:
-    """Return the gaps at all contact points of given `FaceContact` objects in a state, shape (n,), length.
+    """Return the gaps at the contact points of given `FaceContact` objects in a state, shape (n,), length.
 
-    A gap is negative inside the tool. The points of all ranks are included; collective.
+    A gap is negative inside the tool. The points of all ranks are included, except those whose position is prescribed:
+    a rim that is held on a flange touches nothing. Without other points all are included; collective.
     """
     with problem.state_context(state):
-        found = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
-                 for contact in contacts]
-    return np.concatenate([part for parts in problem.comm.allgather(found) for part in parts])
+        gaps = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
+                for contact in contacts]
+        free = [~np.isin(contact.rule.dofs, problem.constrained).all(1) for contact in contacts]
+    all_gaps, kept = (np.concatenate([part for parts in problem.comm.allgather(arrays) for part in parts])
+                      for arrays in (gaps, free))
+    return all_gaps[kept] if kept.any() else all_gaps
