@@ -46,6 +46,24 @@ def test_pin_that_is_narrower_than_the_triangles_ends_the_run(make, half, fricti
         assert deepest > -0.05                               # nodes met it, and the sheet followed
 
 
+def ribbed(draft, height=4.0):
+    """A plug of radius 28 with a narrow rib round its middle, of a height and a draft."""
+    wide = 0.2 + height * np.tan(np.radians(draft))
+    profile = fx.Tool([(0.0, height), (15.0 - wide, height), (14.8, 0.0), (15.2, 0.0), (15.0 + wide, height),
+                       (28.0, height), (28.0, 30.0)])
+    return fx.tools.revolved(profile).moved(z=0.5)
+
+
+def test_triangles_bridge_a_rib_whose_foot_they_meet_and_the_run_says_so():
+    """A sheet sticks to a rib that is narrower than its triangles, and to the plug beside it; a higher rib passes."""
+    path, text = pushed(ribbed(20.0), "stick", travel=12.0)
+    assert not text and path["travel"][-1] == pytest.approx(12.0)
+    warned, = (found for found in path.findings() if "bridge" in found.text)
+    assert warned.severity == "warning" and warned.about == "pin" and "smaller triangles" in warned.text
+    path, text = pushed(ribbed(0.0, height=15.0), "stick", travel=12.0)
+    assert "passes through the sheet" in text
+
+
 @pytest.mark.thorough
 def test_pins_are_held_by_small_triangles():
     path, text = pushed(pin(4.5), "stick", size=3.0, travel=8.0)

@@ -11,6 +11,8 @@ from ...mesh.nodes import nearest
 from ...physics.supports import Symmetry
 from ...ranks import combined, gathered
 from ...values.tolerances import NEGLIGIBLE
+from .lagged_steps import LAGGED
+from .passed_tools import PassedTool
 from .solid_tool import Swept
 from .surface import smaller_stress
 
@@ -54,6 +56,22 @@ def error_of_minimum_wall(path: Any) -> Iterator[Finding]:
         yield Finding("warning", "wall", f"The minimum wall, {wall.wall[k]:.3g} at (x, y, z) = ({place}), is too large"
                       f" by about {error:.2g}: the triangles there are too coarse for it. Use smaller triangles, or"
                       f" trace(..., adapt_mesh={{'error': 0.1}}).")
+
+
+@register("end")
+def bridged_ridges(path: Any) -> Iterator[Finding]:
+    """Yield a finding if a tool is beyond triangles that bridge it, by 0.4 of their edges; collective."""
+    problem = path.problem
+    for face in problem.contacts:
+        if not (face.contact.lagged and face.contact.sticks and face.active):
+            continue
+        with problem.state_context(path.last):
+            fields = problem.x.array_r[:problem.n_owned]
+            found = PassedTool(face).deepest(fields, path.last.control, LAGGED.max_passed_ratio, 0.0)
+        if found is not None and found.ratio > LAGGED.max_passed_ratio:
+            place = ", ".join(f"{v:.4g}" for v in found.place)
+            yield Finding("warning", face.contact.label, f"Triangles bridge the tool {face.contact.label!r}, which is"
+                          f" {found.depth:.2g} beyond them at (x, y, z) = ({place}): use smaller triangles there.")
 
 
 @register("end")

@@ -44,7 +44,7 @@ void crossings(long n, const double *x, long m, const double *P, const long *tri
 
 /* distance of n points x (n, 3) from the nearest of m triangles (m, 3) with corners P, and its longest edge */
 void distances(long n, const double *x, long m, const double *P, const long *triangles, double *distance,
-               double *longest)
+               double *longest, long *nearest)
 {
     for (long k = 0; k < n; k++) {
         double best = 1e300, r[3];
@@ -57,6 +57,7 @@ void distances(long n, const double *x, long m, const double *P, const long *tri
             double f = away(y, p, r);
             if (f >= best) continue;
             best = f;
+            nearest[k] = t;
             longest[k] = sqrt(fmax(away(c[0], c[1], r), fmax(away(c[1], c[2], r), away(c[2], c[0], r))));
         }
         distance[k] = sqrt(best);

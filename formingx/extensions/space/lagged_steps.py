@@ -42,6 +42,8 @@ class LaggedLimits:
             relative changes of the pressure: lightly loaded contacts do not limit the step.
         max_passed_ratio: largest distance by which a point of the tool may have passed a triangle, over the longest
             edge of the triangle. A triangle that bridges a sharp edge cuts off up to 0.35 of its edge.
+        max_bridged_ratio: the same where the sheet sticks and the corners of the triangle touch the tool or will, as
+            over a narrow rib. A chord over a ridge of 40 degrees cuts off 1.4 of its length.
     """
 
     max_approach_ratio: float = 0.7
@@ -54,6 +56,7 @@ class LaggedLimits:
     max_solutions: int = 30
     min_force: float = 1e-2
     max_passed_ratio: float = 0.4
+    max_bridged_ratio: float = 1.5
 
 
 LAGGED = LaggedLimits()
@@ -129,10 +132,16 @@ class LaggedApproach(Approach):
         fields: owned unknowns, shape (n,).
         """
         if self._last is None or self._last[1] != control or not np.array_equal(self._last[0], fields):
-            found = self._passed_tool.deepest(fields, control, LAGGED.max_passed_ratio)
+            found = self._passed_tool.deepest(fields, control, LAGGED.max_passed_ratio, self._bridged_limit)
             self._last = fields.copy(), control, found
         found = self._last[2]
-        return found if found is not None and found.ratio > LAGGED.max_passed_ratio else None
+        passes = found is not None and found.ratio > LAGGED.max_passed_ratio and found.bridged >= self._bridged_limit
+        return found if passes else None
+
+    @property
+    def _bridged_limit(self) -> float:
+        """Largest ratio of a point beyond a triangle whose corners touch the tool; 0 for a sheet that slides."""
+        return LAGGED.max_bridged_ratio if self.face.contact.sticks else 0.0
 
     def passes_through(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         return (super().passes_through(old, old_control, new, control) or self._jumps_over(

@@ -24,6 +24,8 @@ _OFFSET = np.array([1.3e-6, 0.7e-6, 0.0])
 """Shift of the points in the plane, over the median edge of the triangles of the sheet."""
 
 _MOST_COMPARED = 200       # of points on the wrong side, with all triangles
+_TOUCHING = 0.01           # distance of a node from the tool, over the median edge, up to which it touches
+_ADVANCES = 40             # of a corner of a triangle towards the tool, each as long as its distance from it
 _OFF_SURFACE = 0.5         # distance of a point from the tool's surface, over the spacing, above which it is hidden
 _MARGIN = 0.2              # of the points round the sheet, over its extent
 
@@ -35,11 +37,14 @@ class PassedPoint(NamedTuple):
         ratio: its distance from the nearest triangle, over the longest edge of this triangle.
         depth: this distance, length.
         place: position (x, y, z), shape (3,), length.
+        bridged: distance, over the same edge, when all corners of this triangle have moved onto the tool along its
+            normal: that of a ridge above a chord. Infinite beside a vertical wall, which the corners do not meet.
     """
 
     ratio: float
     depth: float
     place: np.ndarray
+    bridged: float
 
 
 class PassedTool:
@@ -80,11 +85,11 @@ class PassedTool:
                 points = points[(points[:, plane.axis] >= plane.position) == plane.above]
         self._points = points + self._size * _OFFSET @ self._sides.axes           # off the edges, which no ray must hit
 
-    def deepest(self, fields: np.ndarray, control: float, negligible: float) -> PassedPoint | None:
+    def deepest(self, fields: np.ndarray, control: float, limit: float, bridged_limit: float) -> PassedPoint | None:
         """Return the point of the tool that passed the sheet farthest, or None; collective.
 
-        fields: owned unknowns, shape (n,). negligible: distance from the nearest node, over the median edge, up to
-        which a point is not examined.
+        Points whose ratio `bridged` is below its limit come last. fields: owned unknowns, shape (n,). A point is not
+        examined if its distance from the nearest node, over the median edge, is below `limit`.
         """
         face, x, sides = self._face, self._points, self._sides
         P = self._placed(face.positions(fields, control))
@@ -97,15 +102,35 @@ class PassedTool:
         if len(wrong) and len(sides.edge):                    # at its edge, the sheet is not continued
             wrong = wrong[nearest(P[sides.edge], x[wrong])[0] > self._size]
         if len(wrong):
-            wrong = wrong[nearest(P, x[wrong])[0] > negligible * self._size]
+            wrong = wrong[nearest(P, x[wrong])[0] > limit * self._size]
         if not len(wrong):
             return None
         wrong = wrong[:: max(len(wrong) // _MOST_COMPARED, 1)]
-        depth, longest = np.zeros(len(wrong)), np.zeros(len(wrong))
+        depth, longest, triangle = np.zeros(len(wrong)), np.zeros(len(wrong)), np.zeros(len(wrong), dtype=np.int64)
         x = np.ascontiguousarray(x[wrong])
-        _C.distances(len(x), x, len(self._cells), P, self._cells, depth, longest)
-        k = int(np.argmax(depth / longest))
-        return PassedPoint(float(depth[k] / longest[k]), float(depth[k]), x[k] + shift)
+        _C.distances(len(x), x, len(self._cells), P, self._cells, depth, longest, triangle)
+        final = depth + self._travels(x, P[self._cells[triangle]], bridged_limit * longest - depth)
+        k = int(np.argmax(depth / longest - 1e3 * (final < bridged_limit * longest)))
+        return PassedPoint(float(depth[k] / longest[k]), float(depth[k]), x[k] + shift, float(final[k] / longest[k]))
+
+    def _travels(self, x: np.ndarray, corners: np.ndarray, most: np.ndarray) -> np.ndarray:
+        """Return how far triangles move along their normals until all corners are on the tool, shape (n,), length.
+
+        It is infinite above `most`, shape (n,). x: points of the tool, shape (n, 3); corners: shape (n, 3, 3), length.
+        """
+        normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        normal /= np.linalg.norm(normal, axis=1)[:, None]
+        normal *= np.sign(np.einsum("ni,ni->n", normal, x - corners.mean(1)))[:, None]          # out of the tool
+        close, tool = _TOUCHING * self._size, self._face.contact.tool
+        travel, moves = np.zeros(corners.shape[:2]), np.ones(corners.shape[:2], dtype=bool)
+        for _ in range(_ADVANCES):                            # the distance from the tool is a safe advance
+            i, j = np.nonzero(moves)
+            if not len(i):
+                break
+            gap = -tool.signed_distance(corners[i, j] - travel[i, j, None] * normal[i])
+            travel[i, j] += np.maximum(gap, close)
+            moves[i, j] = (gap > close) & (travel[i, j] < most[i])
+        return np.where((travel < most[:, None]) & ~moves, travel, np.inf).max(1)
 
     def _placed(self, positions: np.ndarray) -> np.ndarray:
         """Return the positions of all nodes in the order of `_cells`, shape (n, 3), for those of this rank."""
