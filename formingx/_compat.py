@@ -18,6 +18,7 @@ from ufl.corealg.map_dag import map_expr_dag
 from ufl.corealg.multifunction import MultiFunction
 
 from . import _jit
+from .ranks import original
 
 if tuple(int(n) for n in dolfinx.__version__.split(".")[:2]) < (0, 9):
     raise ImportError(f"formingx needs DOLFINx >= 0.9, this is {dolfinx.__version__}; './fx CMD' provides one")
@@ -79,6 +80,7 @@ def _compiled_by_jit(request: Callable[[], Any]) -> Any:
 
     def compile_once(comm: Any, item: Any, form_compiler_options: Any, jit_options: dict[str, Any],
                      **others: Any) -> Any:
+        comm = original(comm)
         options, form_options = jit.get_options(jit_options), ffcx.get_options(form_compiler_options)
         key = _jit.key(item, options, form_options)
         if not comm.allreduce(key in _compiled, op=MPI.LAND):    # ranks compile together, or none does

@@ -6,6 +6,16 @@ import numpy as np
 from mpi4py import MPI
 
 
+def original(comm: Any) -> Any:
+    """Return the communicator whose copy `comm` is, if that is MPI.COMM_WORLD or MPI.COMM_SELF, else `comm`.
+
+    Python objects must not be passed on the copy that a DOLFINx object holds: mpi4py 4.0 keeps a lock for it, and if an
+    exception frees the copy, this lock stays locked, and the next one is waited for without end.
+    """
+    return next((known for known in (MPI.COMM_WORLD, MPI.COMM_SELF)
+                 if MPI.Comm.Compare(comm, known) in (MPI.IDENT, MPI.CONGRUENT)), comm)
+
+
 def gathered(comm: Any, own: Any) -> np.ndarray:
     """Return the rows (m, ...) of all ranks, in their order, as an array (n, ...); collective."""
     return np.concatenate(listed(comm, own))

@@ -1,5 +1,8 @@
 """MPI communicators of runs that are no longer used are freed: MPICH has 2046 for a process."""
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 from mpi4py import MPI
@@ -59,3 +62,34 @@ def run(thickness):
     """A run of the study."""
     scene, until = disc(thickness)
     return fx.trace(scene, until=until, progress=False)
+
+
+FREED_BY_AN_ERROR = """
+import gc
+from mpi4py import MPI
+import formingx as fx
+def body():
+    scene = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=0.5),
+                     loads=[fx.Pressure("bottom")], supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+    path = fx.trace(scene, until=fx.pole_height(0.2), progress=False)
+    path.profile().thickness_ratio_at(0.5)
+    path.save("run")
+    fx.trace(scene, until=fx.pole_height(0.25), start=fx.load("run", scene), progress=False)
+    domain = scene.mesh.domain
+    del scene, path
+    gc.collect()
+    return domain
+try:
+    [body(), body(), 1 / 0]
+except ZeroDivisionError:
+    pass
+MPI.COMM_WORLD.Dup().allgather(1)
+print("ended")
+"""
+
+
+def test_an_error_that_frees_communicators_leaves_no_lock_behind(tmp_path):
+    """No Python object was passed on the copies that DOLFINx holds: mpi4py 4.0.3 would lock the next one for ever."""
+    done = subprocess.run([sys.executable, "-c", FREED_BY_AN_ERROR], cwd=tmp_path, capture_output=True, text=True,
+                          timeout=60, check=False)
+    assert done.stdout.strip().endswith("ended"), done.stderr[-2000:]

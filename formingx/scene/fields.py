@@ -13,7 +13,7 @@ from ..io import csv_files
 from ..mesh import Mesh
 from ..mesh.locate import locate
 from ..mesh.nodes import arguments, axes
-from ..ranks import gathered
+from ..ranks import gathered, original
 from ..values.table import Table
 
 _WHAT = ("a number, a table({{{0}: value}}), a function of ({0}, {1}), a CSV file, what fx.heat returned, or a DOLFINx"
@@ -63,7 +63,7 @@ class PointReader:
     def __init__(self, space: Any, points: np.ndarray):
         domain, element = space.mesh, space.element.basix_element
         X = domain.geometry.x
-        self._comm, self._n = domain.comm, len(points)
+        self._comm, self._n = original(domain.comm), len(points)
         size = float(self._comm.allreduce(np.abs(X).max(initial=0.0), MPI.MAX))
         self._mine, cells, reference = locate(domain, points, size)
         self._dofs = space.dofmap.list[cells]

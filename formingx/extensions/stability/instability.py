@@ -410,9 +410,9 @@ def _selected_states(path: Any, states: Any) -> list[State]:
 
 def max_wave_number(scene: Any) -> float:
     """Return the largest wave number: waves at the largest radius are as long as the shortest edge of an element."""
-    domain = scene.mesh.domain
+    domain, comm = scene.mesh.domain, scene.mesh.comm
     domain.topology.create_connectivity(1, domain.topology.dim)
     edges = np.arange(domain.topology.index_map(1).size_local, dtype=np.int32)
-    shortest = domain.comm.allreduce(float(domain.h(1, edges).min(initial=np.inf)), MPI.MIN)
-    widest = domain.comm.allreduce(float(domain.geometry.x[:, 0].max(initial=0.0)), MPI.MAX)
+    shortest = comm.allreduce(float(domain.h(1, edges).min(initial=np.inf)), MPI.MIN)
+    widest = comm.allreduce(float(domain.geometry.x[:, 0].max(initial=0.0)), MPI.MAX)
     return 2 * np.pi / shortest * (widest if scene.kinematics.axisymmetric else 1.0)

@@ -27,6 +27,7 @@ from ...errors import InputError, check_type, file_path
 from ...findings import Finding
 from ...measures.targets import Target
 from ...problem.problem import Problem
+from ...ranks import original
 from ...scene.scene import Scene
 from ...scene.summary import summary
 from ...solve.arc_length import Curve
@@ -248,7 +249,8 @@ def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
     cells, n = topology.index_map(topology.dim).size_local, space.dofmap.index_map.size_local
     w.x.array[:n] = owned[:n]
     w.x.scatter_forward()
-    parts = space.mesh.comm.gather((topology.original_cell_index[:cells], w.x.array[space.dofmap.list[:cells]]))
+    own = topology.original_cell_index[:cells], w.x.array[space.dofmap.list[:cells]]
+    parts = original(space.mesh.comm).gather(own)
     numbers, values = (np.concatenate(column) for column in zip(*parts or [(np.zeros(0, int), np.zeros((0, 0)))]))
     return values[np.argsort(numbers)]
 
@@ -263,7 +265,7 @@ def _of_cells(space: Any, values: np.ndarray) -> np.ndarray:
 
 def _tail(space: Any, owned: np.ndarray) -> list[float]:
     """Return the owned unknowns that belong to no cell, as Lagrange multipliers, on all ranks; collective."""
-    return space.mesh.comm.allgather(owned[space.dofmap.index_map.size_local:].tolist())[-1]
+    return original(space.mesh.comm).allgather(owned[space.dofmap.index_map.size_local:].tolist())[-1]
 
 
 def _plain_state(state: State) -> dict[str, Any]:

@@ -19,6 +19,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ...mesh.mesh import Mesh
+from ...ranks import original
 from ...scene.summary import text
 from ...values.table import Table
 
@@ -226,11 +227,12 @@ def field_sums(field: Any) -> list[float]:
     """
     space = field.function_space
     points = space.tabulate_dof_coordinates()
-    size = max(float(space.mesh.comm.allreduce(np.abs(points).max(initial=0.0), MPI.MAX)), 1e-300)
+    comm = original(space.mesh.comm)
+    size = max(float(comm.allreduce(np.abs(points).max(initial=0.0), MPI.MAX)), 1e-300)
     n = space.dofmap.index_map.size_local
     values = field.x.array[: n * space.dofmap.index_map_bs].reshape(n, -1).sum(axis=1)
     weights = np.sin(1.0 + points[:n] / size @ [5.0, 7.0, 11.0])
-    return space.mesh.comm.allreduce(np.array([values.sum(), weights @ values]), MPI.SUM).tolist()
+    return comm.allreduce(np.array([values.sum(), weights @ values]), MPI.SUM).tolist()
 
 
 def _object(value: Any, inner: Callable[[Any], Any]) -> Any:
