@@ -3,7 +3,7 @@
 The script itself writes the mould as a closed solid, from its height over the plane: 150 mm by 90 mm at its mouth and
 35 mm deep, walls at 10 degrees to the axis, ribs and a boss (an F) on its floor. The minimum wall, in a corner, needs
 small triangles there. After sheets of one size the mesh is adapted twice, so that the wall changes by at most a fifth
-from one triangle to the next. The minimum wall is a mean over a circle of 8 mm: it changes by 1.1 % from the first
+from one triangle to the next. The minimum wall is a mean over a circle of 8 mm: it changes by 2.8 % from the first
 adapted mesh to the second. The thinnest single triangle is given, too; it does not converge. At the sharp end of a rib
 it becomes thinner on triangles that are much smaller than the thickness, which a membrane does not resolve. Lengths in
 mm, stresses in MPa, times in s.
