@@ -238,6 +238,7 @@ def calls(made: fx.Scene, saved: str) -> list[Call]:
 def _time_and_heat() -> list[Call]:
     """Return calls of materials that relax, and of heat."""
     positive, number, where = ("positive", 1.0), ("number", 0.1), ("word", "top")
+    name = ("name or None", None)
     rubber, material = ("optional thing", fx.NeoHookean(c10=1.0)), ("thing", fx.ThermalProperties(
         conductivity=0.2, density=1e3, heat_capacity=2e3))
     shift = ("optional thing", fx.WLF(c1=10.0, c2=100.0, reference=120.0))
@@ -269,12 +270,15 @@ def _time_and_heat() -> list[Call]:
             "thickness": positive, "conductivity": positive, "heat_capacity": positive,
             "back": number, "start": ("optional number", None), "elements": ("count", 40),
             "finest": ("positive", 1e-4)}),
-        Call("Convection", fx.Convection, {"on": where, "h": ("not negative", 10.0), "air": number}, cool),
-        Call("Absorption", fx.Absorption, {"on": where, "flux": number, "coefficient": positive}, cool),
+        Call("Convection", fx.Convection, {"on": where, "h": ("not negative", 10.0), "air": number,
+                                           "name": name}, cool),
+        Call("Absorption", fx.Absorption, {"on": where, "flux": number, "coefficient": positive,
+                                           "name": name}, cool),
         Call("Radiation", fx.Radiation, {"on": where, "emissivity": ("not negative", 0.9), "heater": number,
-                                         "view_factor": ("not negative", 1.0), "stefan_boltzmann": positive}, cool),
+                                         "view_factor": ("not negative", 1.0), "stefan_boltzmann": positive,
+                                         "name": name}, cool),
         Call("FixedTemperature", fx.FixedTemperature, {"on": where, "temperature": number}, cool),
-        Call("HeatFlux", fx.HeatFlux, {"on": where, "flux": number}, cool),
+        Call("HeatFlux", fx.HeatFlux, {"on": where, "flux": number, "name": name}, cool),
         Call("Units", fx.Units, {"length": ("optional word", "mm"), "stress": ("optional word", "MPa"),
                                  "time": ("any word", "s")}),
         Call("tools.clamp_ring", fx.tools.clamp_ring, {
@@ -287,6 +291,7 @@ def _time_and_heat() -> list[Call]:
     ]
 
 
+BAD["name or None"] = {k: v for k, v in _WORD.items() if k not in ("unknown", "None")}
 BAD["name"] = {k: v for k, v in _WORD.items() if k not in ("unknown",)}
 BAD["label"] = BAD["name"] | _NONE
 BAD["table"] = {"a number": 3, "a word": "x", "a list": [[]], "unknown": {"nobody": [(0.0, 0.0)]}, "empty": {},

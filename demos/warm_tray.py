@@ -17,9 +17,9 @@ from formingx.results import files
 
 SHEET, THICKNESS, DENSITY, START, AIR, SIGMA = (160.0, 100.0), 1.5, 1.05, 110.0, 40.0, 5.67e-14
 HEATERS = ([0.0, 50.0, 80.0], [0.0, 30.0, 50.0], [[300.0, 305.0, 330.0], [305.0, 310.0, 335.0], [330.0, 335.0, 350.0]])
-STIFFNESS = {90.0: 0.6, 110.0: 0.25, 130.0: 0.1, 150.0: 0.05, 180.0: 0.03}            # c10 of the melt, by temperature
+STIFFNESS = {20.0: 0.6, 90.0: 0.6, 110.0: 0.25, 130.0: 0.1, 150.0: 0.05, 180.0: 0.03, 350.0: 0.03}  # c10 by temperature
 SET, SETTING = (80.0, 100.0), 80.0                                     # solidification, and the card's temperature
-FRICTION = {40.0: 0.1, 100.0: 0.2, 130.0: 0.4, 160.0: 0.6}             # of the plug, by temperature of the face
+FRICTION = {20.0: 0.1, 40.0: 0.1, 100.0: 0.2, 130.0: 0.4, 160.0: 0.6, 350.0: 0.6}  # of the plug, by temperature
 PLUG, MOULD = (0.8e-3, 60.0), (0.6e-3, 25.0)                           # contact conductance, temperature
 CORE, TRANSFER, TRAVEL, SPEED, SEAL, VACUUM, EVACUATION, HOLD = 150.0, 1.5, 34.0, 50.0, 0.01, 0.09, 0.5, 10.0
 RIM, DEPTH = -6.0, 36.0                                               # z of the flange, depth of the mould below it

@@ -77,7 +77,8 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
     no fault was found in this scene
     """
     if isinstance(scene, Path):
-        branches = [Finding("warning", "branch point", ANOTHER_PATH % (scene.describe(left), scene.describe(right)))
+        describe = scene.record.describe
+        branches = [Finding("warning", "branch point", ANOTHER_PATH % (describe(left), describe(right)))
                     for left, right in scene.branch_points]
         before = check(scene.problem.scene, targets=targets, stages=stages, units=units).findings
         return Report([*without_notes(scene.findings()), *branches, *before])
