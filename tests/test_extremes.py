@@ -49,6 +49,7 @@ def test_thin_sheets_start_though_their_stresses_cancel_in_round_off(material):
     assert found[1] == pytest.approx(found[0], rel=2e-6)
 
 
+@pytest.mark.thorough
 def test_a_film_that_slides_over_a_lip_starts_towards_its_target():
     """At r0/h0 = 1e5 round-off turns the first tangent; the pressure grows all the same, as that of a thicker film."""
     pressures = []

@@ -338,6 +338,7 @@ def test_base_is_pushed_up_after_the_blow():
 RELAXING = fx.Viscoelastic(fx.NeoHookean(c10=0.004), [(0.08, 0.3), (0.03, 3.0)])
 
 
+@pytest.mark.thorough
 def test_relaxed_energy_leaves_simple_tension_of_a_relaxing_tube_as_it_is():
     """In simple tension the relaxed energy is that of the membrane. Its internal variables have the same axes."""
     sags = []

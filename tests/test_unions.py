@@ -44,7 +44,7 @@ def test_unions_that_are_refused(parts, options, text):
         fx.tools.union(*parts, **options)
 
 
-@pytest.mark.parametrize("friction", ["stick", 0.2, pytest.param("none", marks=pytest.mark.thorough)])
+@pytest.mark.parametrize("friction", ["stick", *(pytest.param(mu, marks=pytest.mark.thorough) for mu in (0.2, "none"))])
 def test_no_point_of_the_sheet_lies_inside_a_part(friction):
     """Of two contacts with one face, one would hold the points that the other should stop."""
     path, tool = form(friction)

@@ -48,6 +48,7 @@ def test_modulus_is_the_mean_over_the_column():
     assert abs(path["pressure"][-1] / pressure(float(MODULUS(weights @ T))) - 1) > 0.02
 
 
+@pytest.mark.thorough
 def test_an_energy_that_is_not_linear_is_integrated_over_the_column():
     """A limiting stretch that depends on the temperature: the pressure is that of layers with a limit each."""
     limit = fx.table({20.0: 1.5, 200.0: 20.0})
