@@ -11,6 +11,7 @@ from ... import figures
 from ...contact.tooling import Tooling
 from ...results.show.animation import between, spread
 from ...results.show.views import look, screen, shading
+from .show import add_part
 from .wall import wall_of
 
 _LARGEST_TOOL = 20_000
@@ -52,11 +53,8 @@ def frame_pictures(path: Any, frames: int) -> Callable[[], list[Any]]:
                 plotter: Any = pyvista.Plotter(off_screen=True, window_size=(800, 640))
                 try:
                     plotter.set_background("white")
-                    faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
-                    for scale, shift in planes.images(3):
-                        surface = pyvista.PolyData(wall.deformed_points * scale + shift, faces)
-                        surface.cell_data["ratio"] = wall.ratio
-                        plotter.add_mesh(surface, **(shading(ratios) | {"smooth_shading": False}))
+                    add_part(plotter, wall, wall.ratio, planes.images(3),
+                             **(shading(ratios) | {"smooth_shading": False}))
                     for tool, along, vector in zip(tools, travel, vectors):
                         if tool is not None and along is not None:
                             _add_tool(plotter, pyvista, tool, along * vector)

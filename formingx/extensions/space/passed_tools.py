@@ -86,10 +86,11 @@ class PassedTool:
         self._points = points + self._size * _OFFSET @ self._sides.axes           # off the edges, which no ray must hit
 
     def deepest(self, fields: np.ndarray, control: float, limit: float, bridged_limit: float) -> PassedPoint | None:
-        """Return the point of the tool that passed the sheet farthest, or None; collective.
+        """Return the point of the tool with the largest ratio, or None; collective.
 
-        Points whose ratio `bridged` is below its limit come last. fields: owned unknowns, shape (n,). A point is not
-        examined if its distance from the nearest node, over the median edge, is below `limit`.
+        Points whose ratio `bridged` is below its limit come last; with the limit 0 none is. fields: owned unknowns,
+        shape (n,). A point is not examined if its distance from the nearest node, over the median edge, is below
+        `limit`.
         """
         face, x, sides = self._face, self._points, self._sides
         P = self._placed(face.positions(fields, control))
@@ -109,9 +110,12 @@ class PassedTool:
         depth, longest, triangle = np.zeros(len(wrong)), np.zeros(len(wrong)), np.zeros(len(wrong), dtype=np.int64)
         x = np.ascontiguousarray(x[wrong])
         _C.distances(len(x), x, len(self._cells), P, self._cells, depth, longest, triangle)
-        final = depth + self._travels(x, P[self._cells[triangle]], bridged_limit * longest - depth)
-        k = int(np.argmax(depth / longest - 1e3 * (final < bridged_limit * longest)))
-        return PassedPoint(float(depth[k] / longest[k]), float(depth[k]), x[k] + shift, float(final[k] / longest[k]))
+        ratio, bridged = depth / longest, np.full(len(x), np.inf)
+        if bridged_limit > 0:
+            travels = self._travels(x, P[self._cells[triangle]], bridged_limit * longest - depth)
+            bridged = (depth + travels) / longest
+        k = np.lexsort((ratio, bridged >= bridged_limit))[-1]
+        return PassedPoint(float(ratio[k]), float(depth[k]), x[k] + shift, float(bridged[k]))
 
     def _travels(self, x: np.ndarray, corners: np.ndarray, most: np.ndarray) -> np.ndarray:
         """Return how far triangles move along their normals until all corners are on the tool, shape (n,), length.

@@ -57,18 +57,27 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None, camera: An
         lift = 0.004 * size * away / np.linalg.norm(away)           # else lines flicker
         order = np.argsort(shown)
         largest = shown[order][np.searchsorted(np.cumsum(wall.area[order]), _DRAWN_AREA * wall.area.sum())]
-        faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
         with plotted(file) as plotter:
+            add_part(plotter, wall, shown, images, **shading(np.minimum(shown, largest), name), specular=0.2,
+                     split_sharp_edges=False)
             for scale, shift in images:
-                surface = pyvista.PolyData(wall.deformed_points * scale + shift, faces)
-                surface.cell_data["ratio"] = shown
-                plotter.add_mesh(surface, **shading(np.minimum(shown, largest), name), specular=0.2,
-                                 split_sharp_edges=False)
                 for line in lines:
                     plotter.add_mesh(pyvista.lines_from_points(line * scale + shift + lift), color="black",
                                      line_width=1.5)
             look(plotter, away, np.vstack([wall.deformed_points * scale + shift for scale, shift in images]))
     files.on_root(path.problem.comm, draw)
+
+
+def add_part(plotter: Any, wall: Any, values: np.ndarray, images: Any, **style: Any) -> None:
+    """Add a wall and its images to a pyvista plotter, coloured by values of the triangles, shape (m,).
+
+    images: pairs (scale, shift) of positions; style: arguments of `add_mesh`, with the colours by "ratio".
+    """
+    faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
+    for scale, shift in images:
+        surface = figures.pyvista().PolyData(wall.deformed_points * scale + shift, faces)
+        surface.cell_data["ratio"] = values
+        plotter.add_mesh(surface, **style)
 
 
 _LARGEST_MITRE = 3.0

@@ -22,7 +22,7 @@ from ...mesh.nodes import own_cells
 from ...ranks import gathered
 from ...results.files.column_table import ColumnTable
 from . import show
-from .heat.basis import lagrange
+from .heat.basis import lagrange, layer_shares
 from .wall import SheetWall, wall_of
 
 
@@ -120,11 +120,10 @@ def _parts(scene: Any, depth: float | None) -> dict[str, float | None]:
     """Return {layer: depth within it, 0 to 1, or None for its mean} for the layers that have a part in the stresses."""
     if depth is None:
         return dict.fromkeys(scene.mesh.layers)
-    x = scene.mesh.domain.geometry.x[:1].T
-    h = np.array([float(np.ravel(scene.thickness[name](*x))[0]) for name in scene.mesh.layers])
-    ends = np.concatenate([[0.0], np.cumsum(h / h.sum())])
-    k = int(np.clip(np.searchsorted(ends, depth, side="right") - 1, 0, len(h) - 1))
-    return {list(scene.mesh.layers)[k]: float((depth - ends[k]) / (ends[k + 1] - ends[k]))}
+    shares = layer_shares(scene)
+    ends = np.concatenate([[0.0], np.cumsum([*shares.values()])])
+    k = int(np.clip(np.searchsorted(ends, depth, side="right") - 1, 0, len(shares) - 1))
+    return {[*shares][k]: float((depth - ends[k]) / (ends[k + 1] - ends[k]))}
 
 
 def _evaluated(forms: Any, expression: Any, cells: np.ndarray, places: Any) -> np.ndarray:

@@ -120,15 +120,19 @@ def lagrange(nodes: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.asarray(away.prod(2))
 
 
+def layer_shares(scene: Any) -> dict[str, float]:
+    """Return {layer: its share of the thickness at the first node}, from the bottom up; collective."""
+    x = scene.mesh.domain.geometry.x[:1].T
+    own = [float(np.ravel(scene.thickness[name](*x))[0]) for name in scene.mesh.layers] if x.size else []
+    h = next(found for found in scene.mesh.comm.allgather(own) if found)
+    return {name: value / sum(h) for name, value in zip(scene.mesh.layers, h)}
+
+
 def basis_of(scene: Any, materials: Any) -> ColumnBasis:
     """Return the basis of the columns of a scene, whose first layer is at the bottom.
 
     materials: {layer: `ThermalProperties`}, or one for all layers.
     """
     materials = materials if isinstance(materials, Mapping) else dict.fromkeys(scene.mesh.layers, materials)
-    x = scene.mesh.domain.geometry.x[:1].T
-    h = {name: float(np.ravel(given(*x))[0]) for name, given in scene.thickness.items()} if x.size else {}
-    h = next(found for found in scene.mesh.comm.allgather(h) if found)
-    names = list(scene.mesh.layers)
-    total = sum(h.values())
-    return ColumnBasis([h[name] / total for name in names], [materials[name] for name in names], names)
+    shares = layer_shares(scene)
+    return ColumnBasis([*shares.values()], [materials[name] for name in shares], [*shares])
