@@ -193,12 +193,13 @@ def test_oscillations_at_several_temperatures_give_the_shift():
 
 
 def test_low_moduli_count_as_much_as_high_ones():
-    """The modulus at 0.01 /s is 1e-5 of the highest; its misfit is relative to itself."""
+    """The modulus at 0.01 /s is 1e-4 of the highest; its misfit is relative to itself, also beside errors of 2 %."""
     x = OMEGA[:, None] * np.array([0.01, 100.0])
     mu = np.array([1e5, 10.0])
-    test = fx.OscillationTest(OMEGA, (x**2 / (1 + x**2)) @ mu, (x / (1 + x**2)) @ mu)
+    wrong = 1 + 0.02 * np.where(OMEGA > 1.0, np.cos(np.arange(len(OMEGA))), 0.0)
+    test = fx.OscillationTest(OMEGA, wrong * ((x**2 / (1 + x**2)) @ mu), wrong * ((x / (1 + x**2)) @ mu))
     found = fx.fit(fx.TransientNetwork(None, [(1e4, 0.1), (1e3, 10.0)]), [test])
-    assert found.constants["mu_2"] == pytest.approx(10.0, rel=1e-3)
+    assert found.constants["mu_2"] == pytest.approx(10.0, rel=0.02)
 
 
 @pytest.mark.parametrize("test, message", [

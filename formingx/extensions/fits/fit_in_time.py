@@ -18,7 +18,7 @@ from ...materials.hyperelastic import NeoHookean
 from ...materials.material import Material
 from ...materials.relaxing import GeneralisedMaxwell
 from .oscillation import OscillationTest, checked_oscillation
-from .rows import equilibrium_values, row_divisors, rows_of
+from .rows import equilibrium_values, largest_I1, row_divisors, rows_of
 from .timed_test import TimedTest, checked_timed_test
 from .uncertainty import Uncertainty, uncertainty
 from .weights import in_range
@@ -106,8 +106,7 @@ class _TimedData:
             raise InputError("fit: data: no test lasts any time: the times of each are all the same")
         low, high = np.log(min(part.shortest for part in self.rows) / 10), np.log(10 * longest)
         self.log_tau = np.linspace(low, high, 2 + int(_TIMES_PER_DECADE * (high - low) / np.log(10)))
-        l1, l2 = np.hstack([part.stretches for part in self.rows])
-        self.largest_I1 = float(np.max(l1**2 + l2**2 + (l1 * l2) ** -2))
+        self.largest_I1 = largest_I1(self.rows)
         self._branches = [part.branch(law, self.log_tau, 1e-8) for part in self.rows]
 
     def branch(self, log_tau: Any) -> np.ndarray:
@@ -154,8 +153,7 @@ class ShiftedTests:
             low, high = np.log(part.shortest / 1000), np.log(1000 * part.longest)
             grid = np.linspace(low, high, 2 + int(_TIMES_PER_DECADE / 2 * (high - low) / np.log(10)))
             self._branches.append((low, high, part.branch(type(given), grid, 1e-6)))
-        l1, l2 = np.hstack([part.stretches for part in self._rows])
-        self._equilibrium = _scaled(given.equilibrium, 1.0, float(np.max(l1**2 + l2**2 + (l1 * l2) ** -2)))
+        self._equilibrium = _scaled(given.equilibrium, 1.0, largest_I1(self._rows))
 
     def branches(self, tau: np.ndarray, factors: np.ndarray) -> np.ndarray:
         """Return the stresses of j branches of unit modulus at all measured points, shape (n, j).

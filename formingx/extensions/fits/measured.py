@@ -22,6 +22,7 @@ from ...units import FORCES, LENGTHS, STRESSES
 from .measured_oscillation import (
     MODULI,
     OSCILLATION_COLUMNS,
+    TEMPERATURE_UNITS,
     MeasuredOscillation,
     read_oscillations,
     used_columns,
@@ -49,7 +50,7 @@ _STRETCHES, _STRESSES = ("stretch", "strain", "true strain", "displacement"), ("
 _UNITS: dict[str, tuple[str, ...]] = {
     "strain": ("%", "mm/mm", "m/m"), "true strain": ("%",), "displacement": tuple(LENGTHS), "stress": tuple(STRESSES),
     "true stress": tuple(STRESSES), "force": tuple(FORCES), "time": ("s", "ms", "min", "h"),
-    "temperature": ("C", "°C", "K", "degC", "Grad C")}
+    "temperature": TEMPERATURE_UNITS}
 _SPECIMEN = ("length", "width", "thickness", "area")
 
 

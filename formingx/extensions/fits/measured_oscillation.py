@@ -26,9 +26,10 @@ OSCILLATION_COLUMNS = {
 _PAIRS = {("storage modulus", "loss modulus"): None, ("G'", "G''"): "shear", ("E'", "E''"): "uniaxial"}
 """{columns of both moduli: mode of the test, or None if the columns do not say it}."""
 MODULI = {name for names in _PAIRS for name in names}
+TEMPERATURE_UNITS = ("C", "°C", "K", "degC", "Grad C")
 _UNITS: dict[str, tuple[str, ...]] = {
-    "frequency": ("Hz",), "angular frequency": ("rad/s", "1/s", "s^-1"),
-    "temperature": ("C", "°C", "K", "degC", "Grad C"), **dict.fromkeys(MODULI, tuple(STRESSES))}
+    "frequency": ("Hz",), "angular frequency": ("rad/s", "1/s", "s^-1"), "temperature": TEMPERATURE_UNITS,
+    **dict.fromkeys(MODULI, tuple(STRESSES))}
 
 
 class MeasuredOscillation(NamedTuple):

@@ -113,6 +113,12 @@ def row_divisors(rows: list[Rows], relative: Any, weights: list[float]) -> np.nd
     return divisors([part.measured for part in rows], relative, weights, [part.floor for part in rows])
 
 
+def largest_I1(rows: list[Rows]) -> float:
+    """Return the largest first invariant of C at the stretches of all rows."""
+    l1, l2 = np.hstack([part.stretches for part in rows])
+    return float(np.max(l1**2 + l2**2 + (l1 * l2) ** -2))
+
+
 def rows_of(test: TimedTest | OscillationTest) -> Rows:
     """Return the rows of a checked test."""
     return OscillationRows(test) if isinstance(test, OscillationTest) else TimedRows(test)
