@@ -94,7 +94,6 @@ with _optional():
     from .extensions.fits.fit_damping import Spectrum, fit_spectrum
 with _optional():
     from .extensions.space import checks as _space_checks
-    from .extensions.space import crossing as _crossing_checks
     from .extensions.space import edge_checks as _edge_checks
     from .extensions.space import mould_checks as _mould_checks
     from .extensions.space import tool_checks as _tool_checks

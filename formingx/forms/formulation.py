@@ -129,6 +129,10 @@ class Formulation(ABC):
         """Return the quadrature rule of the energy."""
         return EnergyRule.of_degree(self.domain.basix_cell(), self.scene.quadrature_degree)
 
+    def law_axes(self, material: Any, names: list[str]) -> Callable:
+        """Return the function that refers F to the directions that a material in some layers takes; here those of F."""
+        return lambda F: F
+
     def mean_over_depths(self, law: Callable, terms: MaterialTerms) -> Callable:
         """Return the law f(T) of a coefficient at a point; for temperatures at several depths the mean of f."""
         return law

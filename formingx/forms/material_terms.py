@@ -27,6 +27,7 @@ class MaterialTerms:
         forms: the `Formulation`.
         material: the `Material`.
         names: names of the layers.
+        in_law_axes: function that refers F to the directions that the energies of the material take.
         X: reference position (UFL, length, shape (2,)).
         constants: {name: coefficient}, a `Constant` for a number; else a `Function` or another UFL scalar.
         rest_stress: stress dW/dF11 of the energy at F = I (UFL scalar, stress).
@@ -41,6 +42,7 @@ class MaterialTerms:
 
     def __init__(self, forms: Any, material: Any, names: list[str]):
         self.forms, self.material, self.names = forms, material, names
+        self.in_law_axes = forms.law_axes(material, names)
         self.cells = forms.cells_of(names)
         self.own_cells = self.cells[self.cells < len(own_cells(forms.domain))]
         self.X = forms.X
@@ -117,12 +119,14 @@ class MaterialTerms:
 
     def step_energy(self, F: Any) -> Any:
         """Return the incremental potential of the step per reference volume (UFL, stress); F: elastic."""
+        F = self.in_law_axes(F)
         if not self.has_history:
             return self.material.strain_energy(F, **self.constants)
         return self.material.step_energy(F, self.internal | self.past_integrals, self._time_step, **self.constants)
 
     def stored_energy(self, F: Any) -> Any:
         """Return the stored energy per reference volume (UFL, stress); F: elastic, shape (3, 3)."""
+        F = self.in_law_axes(F)
         if not self.has_history:
             return self.material.strain_energy(F, **self.constants)
         return self.material.stored_energy(F, self.internal | self.past_integrals, **self.constants)
@@ -139,15 +143,15 @@ class MaterialTerms:
 
     def equilibrium_energy(self, F: Any) -> Any:
         """Return the energy after complete relaxation, per reference volume (UFL, stress), or None."""
-        return self.material.equilibrium_energy(F, **self.constants)
+        return self.material.equilibrium_energy(self.in_law_axes(F), **self.constants)
 
     def elastic_stretches(self, F: Any) -> list[Any]:
         """Return the largest principal elastic stretch of each relaxing branch (UFL scalars)."""
-        return self.material.elastic_stretches(F, self.internal, **self.constants)
+        return self.material.elastic_stretches(self.in_law_axes(F), self.internal, **self.constants)
 
     def dissipation(self, F: Any) -> Any:
         """Return the dissipated power per reference volume (UFL, stress over time); F: elastic."""
-        return self.material.dissipation(F, self.internal, **self.constants)
+        return self.material.dissipation(self.in_law_axes(F), self.internal, **self.constants)
 
     def damage_energy(self) -> Any:
         """Return the energy dissipated by damage per reference volume (UFL, stress)."""
@@ -158,7 +162,7 @@ class MaterialTerms:
 
         Raise `InputError` if `Material.updated` returns other names or shapes than `Material.internal` has.
         """
-        found = self.material.updated(F, self.internal, self._time_step, **self.constants)
+        found = self.material.updated(self.in_law_axes(F), self.internal, self._time_step, **self.constants)
         shapes = {name: ufl.as_ufl(value).ufl_shape for name, value in found.items()}
         requested = {name: np.shape(value) for name, value in self.material.internal.items()}
         if shapes != requested:

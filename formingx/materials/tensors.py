@@ -13,8 +13,9 @@ def isochoric(F: Any) -> Entries:
 
     .. math:: \bar C = J^{-2/3} F^T F
 
-    F (UFL) has shape (3, 3); the result has the entries (11, 22, 12, 33).
+    F (UFL) has shape (3, 3); the result has the entries (11, 22, 12, 33), with the axis of 33 normal to the others.
     """
+    F = kinematics.in_section_order(F)
     C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
     return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
 

@@ -295,6 +295,17 @@ def is_block(F):
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
 
 
+def in_section_order(F):
+    """Return F (UFL, shape (3, 3)) with the axes 2 and 3 exchanged if axis 2 is separate by construction.
+
+    So it is for laws that depend on the direction in a sheet in three dimensions, whose axis 2 is the normal.
+    """
+    across = ((0, 1), (1, 2), (1, 0), (2, 1))
+    if is_block(F) or not all(isinstance(F[place], Zero) for place in across):
+        return F
+    return ufl.as_tensor([[F[i, j] for j in (0, 2, 1)] for i in (0, 2, 1)])
+
+
 def invariants(F):
     r"""Return the first two invariants of C = F^T F (UFL scalars), for F of shape (3, 3).
 
@@ -326,6 +337,7 @@ def sum_of_powers(F, alpha):
     Returns:
         The sum (UFL scalar).
     """
+    F = in_section_order(F)
     C = F.T * F
     a = alpha / 2
     m = (C[0, 0] + C[1, 1]) / 2

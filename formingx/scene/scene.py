@@ -144,6 +144,8 @@ class Scene:
                              f" already")
         self._check_names()
         self._check_materials()
+        if self.kinematics.components == 3:
+            self.kinematics.scene_checks.check_laws(self)
         boundary_checks.check(self)
         if (planes := mirror_planes(self)).planes:
             self.symmetry = planes

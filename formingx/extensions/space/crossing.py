@@ -1,12 +1,19 @@
-"""Check that the layers of a surface in three dimensions do not pass through each other, or through a mirror plane."""
+"""Check of a state of a surface in three dimensions: do its layers pass through each other, or through a mirror plane?
+
+A membrane has no contact with itself. Layers that meet need a tool between them, such as the parting plane of half
+moulds, or a plane of symmetry.
+"""
+
+from __future__ import annotations
 
 from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
-from ...findings import Finding, register
-from ...mesh.boxes import overlapping
+from ..._jit import CFunctions
+
+_C = CFunctions("extensions/space/layers.c")
 
 _DEPTH = 1e-3
 """Smallest distance by which an edge passes through another triangle, over the extent of the surface.
@@ -15,65 +22,66 @@ Layers that a mould presses flat lie on each other to its penetration.
 """
 
 _DEPTH_OF_WALL, _DEPTH_OF_EDGE = 0.5, 0.4
-"""The same over the mean thickness, and at most over the median edge: layers at a pinch lie within the wall."""
+"""The same over the mean thickness, and at most over the longest edge of its triangle.
+
+Layers at a pinch lie within the wall.
+"""
+
+_BEYOND_PLANE = 0.02
+"""Largest distance of a surface beyond a plane of symmetry, over its extent."""
 
 
-@register("end")
-def crossing_layers(path: Any) -> Iterator[Finding]:
-    """Yield a finding if layers of a surface cross each other or a plane of symmetry at the end; collective.
+class SelfPenetration:
+    """Check of the states of a surface for layers that cross each other or a plane of symmetry.
 
-    A membrane has no contact with itself. Layers that meet need a tool between them, such as the parting plane of half
-    moulds, or a plane of symmetry.
+    Args:
+        surface: formulation of the surface.
     """
-    scene = path.problem.scene
-    if scene.kinematics.components != 3:
-        return
-    wall = path.wall()
-    x, size = wall.deformed_points, float(np.ptp(wall.deformed_points, axis=0).max())
-    for plane in scene.symmetry.planes:
-        beyond = (plane.position - x[:, plane.axis]) * (1 if plane.above else -1)
-        if beyond.max() > 10 * _DEPTH * size:
-            yield _finding(f"the surface passes {beyond.max():.3g} through the plane of symmetry"
-                           f" {'xyz'[plane.axis]} = {plane.position:.4g}", x[np.argmax(beyond)])
-    edge = float(np.median(np.linalg.norm(np.diff(x[wall.triangles], axis=1), axis=2)))
-    thickness = float(wall.reference_thickness.mean())
-    places = crossings(x, wall.triangles, max(_DEPTH * size, min(_DEPTH_OF_WALL * thickness, _DEPTH_OF_EDGE * edge)))
-    if len(places):
-        yield _finding(f"layers of the surface pass through each other at {len(places)} edges", places[0])
+
+    def __init__(self, surface: Any):
+        self._whole, self._planes = surface.whole, surface.scene.symmetry.planes
+        X = self._whole.reference
+        thickness = np.sum([given(*X.T) for given in surface.scene.thickness.values()], axis=0)
+        self._wall = _DEPTH_OF_WALL * float(thickness.mean())
+
+    def reasons(self, fields: np.ndarray) -> Iterator[str]:
+        """Yield each reason why no sheet can have a state, as text; fields: owned unknowns; collective."""
+        x = self._whole.positions(fields)
+        size = float(np.ptp(x, axis=0).max())
+        for plane in self._planes:
+            beyond = (plane.position - x[:, plane.axis]) * (1 if plane.above else -1)
+            k = int(np.argmax(beyond))
+            if beyond[k] > _BEYOND_PLANE * size:
+                yield (f"the sheet crosses the plane of symmetry {'xyz'[plane.axis]} = {plane.position:.4g} by"
+                       f" {beyond[k]:.3g} at (x, y, z) = ({_position(x[k])}), where its mirror image is: a tool between"
+                       f" both halves is missing")
+        found = crossings(x, self._whole.triangles, _DEPTH * size, self._wall)
+        if len(found):
+            k = int(np.argmax(found[:, 3]))
+            yield (f"the sheet passes through itself at (x, y, z) = ({_position(found[k, :3])}), where an edge of one"
+                   f" layer is {found[k, 3]:.2g} beyond the other: a membrane has no contact with itself. Put a tool"
+                   f" between the layers, such as half moulds that are solid up to their parting plane"
+                   f" (fx.tools.half), or model one half with Symmetry there, or stop before they meet (until=)")
 
 
-def _finding(text: str, place: np.ndarray) -> Finding:
-    """Return the finding for a fault at a place, shape (3,), length."""
-    at = ", ".join(f"{v:.4g}" for v in place)
-    return Finding("serious", "membrane", f"{text}, one at (x, y, z) = ({at}): a membrane has no contact with itself",
-                   "half moulds that are solid up to their parting plane (fx.tools.half), or a model of the half with"
-                   " Symmetry there")
+def crossings(points: np.ndarray, triangles: np.ndarray, least: float, wall: float = 0.0) -> np.ndarray:
+    """Return the places where edges of a surface pass through its triangles, and their depths, (k, 4), length.
 
-
-def crossings(points: np.ndarray, triangles: np.ndarray, depth: float) -> np.ndarray:
-    """Return the places where edges of a surface pass through its triangles, shape (k, 3), length.
-
-    depth: smallest distance of both ends of an edge from the plane of the triangle, length.
+    The depth is the smaller distance of the ends of an edge from the plane of the triangle. Edges count that are deeper
+    than `least`, and deeper than `wall` or 0.4 of the longest edge
+    of their triangle.
     """
-    corners = points[triangles]
-    low, high = corners.min(1), corners.max(1)
-    found = []
-    plane = [np.ascontiguousarray(box[:, [0, 2]]) for box in (low, high)]
-    for i, j in overlapping(*plane):
-        near = (low[i, 1] <= high[j, 1]) & (low[j, 1] <= high[i, 1])
-        apart = ~(triangles[i][:, :, None] == triangles[j][:, None]).any((1, 2))
-        i, j = i[near & apart], j[near & apart]
-        for a, b in ((i, j), (j, i)):
-            A = corners[a]
-            normal = np.cross(A[:, 1] - A[:, 0], A[:, 2] - A[:, 0])
-            normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
-            for k in range(3):
-                p, q = corners[b, k], corners[b, (k + 1) % 3]
-                d, e = (np.einsum("ni,ni->n", end - A[:, 0], normal) for end in (p, q))
-                cut = (d * e < 0) & (np.minimum(np.abs(d), np.abs(e)) > depth)
-                place = p[cut] + (d[cut] / (d - e)[cut])[:, None] * (q - p)[cut]
-                T, n = A[cut], normal[cut]
-                sides = [np.einsum("ni,ni->n", np.cross(T[:, (m + 1) % 3] - T[:, m], place - T[:, m]), n)
-                         for m in range(3)]
-                found.append(place[np.min(sides, axis=0) > 0])
-    return np.concatenate(found) if found else np.zeros((0, 3))
+    room = 100
+    while True:
+        found = np.empty((room, 4))
+        count = _C.crossings(len(triangles), points, triangles, least, wall, _DEPTH_OF_EDGE, room, found)
+        if count < 0:
+            raise MemoryError("no memory to compare the triangles of a surface")
+        if count <= room:
+            return found[:count]
+        room = count
+
+
+def _position(x: np.ndarray) -> str:
+    """Return a position, shape (3,), as text."""
+    return ", ".join(f"{v:.4g}" for v in x)

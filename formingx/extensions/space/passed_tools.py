@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..._jit import CFunctions
-from ...mesh.nodes import nearest, own_cells
-from ...ranks import gathered
+from ...mesh.nodes import nearest
 from .surface_sides import SurfaceSides
 
 _C = CFunctions("extensions/space/crossings.c")
@@ -57,22 +56,10 @@ class PassedTool:
     """
 
     def __init__(self, face: Any):
-        self._face = face
-        surface = face.rule.surface
-        vectors, numbers = surface.space.sub(0).collapse()
-        own = own_cells(surface.domain)
-        dofs, index = vectors.dofmap.list[own], vectors.dofmap.index_map
-        cells = index.local_to_global(np.ascontiguousarray(dofs.ravel(), dtype=np.int32)).reshape(-1, 3)
-        nodes = np.arange(len(face.points), dtype=np.int32)
-        place = np.full(index.size_local + index.num_ghosts, -1)
-        node_of = {int(dof): k for k, dof in enumerate(np.asarray(numbers).reshape(-1, 3)[:, 0])}
-        place[nodes] = [node_of[int(dof)] for dof in face.rule.dofs[:, 0]]
-        self._order = gathered(face.comm, index.local_to_global(place[nodes].astype(np.int32)))
-        self._cells = gathered(face.comm, cells)
-        X, scene = self._placed(face.points), surface.scene
-        corners, flat = X[self._cells], scene.mesh.flat
-        turned = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])[:, 2] < 0
-        self._cells[turned & flat] = self._cells[turned & flat][:, ::-1]
+        self._face, surface = face, face.rule.surface
+        self._whole, scene, flat = surface.whole, surface.scene, surface.mesh.flat
+        self._cells, X = self._whole.triangles, self._whole.reference
+        corners = X[self._cells]
         edges = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2)
         self._size = float(np.median(edges))
         self._sides = SurfaceSides(self._cells, X, flat, scene.symmetry.planes, self._size)
@@ -93,11 +80,11 @@ class PassedTool:
         `limit`.
         """
         face, x, sides = self._face, self._points, self._sides
-        P = self._placed(face.positions(fields, control))
+        shift = face.tool_displacement(control)
+        P = self._whole.positions(fields) - shift
         x = x[sides.within(x, P, not self._faces_out)] if sides.known else x[:0]
         if not len(x):
             return None
-        shift = face.tool_displacement(control)
         outside, met = sides.outside(x, P, shift[2])
         wrong = np.flatnonzero(met & (outside != self._faces_out))
         if len(wrong) and len(sides.edge):                    # at its edge, the sheet is not continued
@@ -135,12 +122,6 @@ class PassedTool:
             travel[i, j] += np.maximum(gap, close)
             moves[i, j] = (gap > close) & (travel[i, j] < most[i])
         return np.where((travel < most[:, None]) & ~moves, travel, np.inf).max(1)
-
-    def _placed(self, positions: np.ndarray) -> np.ndarray:
-        """Return the positions of all nodes in the order of `_cells`, shape (n, 3), for those of this rank."""
-        found = np.empty((len(self._order), 3))
-        found[self._order] = gathered(self._face.comm, positions)
-        return found
 
 
 def surface_points(tool: Any, spacing: float, nodes: np.ndarray, margin: float) -> np.ndarray:

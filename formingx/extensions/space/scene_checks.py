@@ -7,12 +7,13 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+from mpi4py import MPI
 
 from ...errors import InputError, call_on_all_ranks, check_name, finite, positive, values
 from ...mesh.nodes import SAME_PLACE, arguments
 from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode, Symmetry
-from ...ranks import gathered
+from ...ranks import combined, gathered
 from ...values.tolerances import NEGLIGIBLE
 from .surface_mesh import SurfaceMesh
 
@@ -115,6 +116,27 @@ def refuse(scene: Any, heat: Any) -> None:
                              " nodes")
         if isinstance(support, Symmetry) and support.on in scene.mesh.boundaries:
             _check_plane(scene, support)
+
+
+def depends_on_direction(scene: Any, layer: str) -> bool:
+    """Return True if the energy of a layer depends on the direction, as with fibres; collective."""
+    material = scene.materials[layer]
+    isotropic = material.is_isotropic(scene.sample(layer) if material.varies else None)
+    return not combined(scene.mesh.comm, isotropic, MPI.LAND)
+
+
+def check_laws(scene: Any) -> None:
+    """Raise an `InputError` for an energy that depends on the direction in a membrane that wrinkles; collective.
+
+    Tension-field theory knows the relaxed energy of isotropic laws alone.
+    """
+    if scene.model.wrinkles is None:
+        return
+    for name in scene.mesh.layers:
+        if depends_on_direction(scene, name):
+            raise InputError(f"Scene: materials: the energy of {scene.materials[name]} depends on the direction, and"
+                             f" Membrane(wrinkles={scene.model.wrinkles:g}) knows the energy in wrinkles of isotropic"
+                             f" materials alone: must be Membrane()")
 
 
 def check_heat(scene: Any, cooling: Any) -> None:

@@ -23,6 +23,7 @@ from ...ranks import gathered
 from ...results.files.column_table import ColumnTable
 from . import show
 from .heat.basis import lagrange, layer_shares
+from .scene_checks import depends_on_direction
 from .wall import SheetWall, wall_of
 
 
@@ -152,6 +153,9 @@ class _Layer:
         """Return the mean stresses of the layer, or those at a depth in it, shape (m, 3), stress."""
         forms, terms, rule = self._forms, self._terms, self._forms.rule
         if depth is not None and self._basis is not None and not terms.has_history:
+            if depends_on_direction(forms.scene, terms.names[0]):
+                raise InputError(f"Path.stress: depth = {depth!r}: with heat=... and the energy of {terms.material},"
+                                 f" which depends on the direction, only means are available: leave depth out")
             return self._elastic(depth)
         F = ufl.variable(forms.elastic_F)
         tau = ufl.diff(forms.layer_energy(terms.step_energy, F), F) * F.T

@@ -40,10 +40,13 @@ from ...forms.probes import Probe
 from ...materials.solidification import Solidification
 from ...physics.loads import Pressure
 from ...values.tolerances import NEGLIGIBLE
+from .crossing import SelfPenetration
 from .heat.basis import ColumnBasis, basis_of
 from .heat.linear import is_linear
 from .heat.temperature import ColumnTemperature
 from .pressure_on_tools import PressureOnTools
+from .scene_checks import depends_on_direction
+from .whole_surface import WholeSurface
 
 _REGULARISING_STIFFNESS = 1e-7
 """Stiffness of the displacement gradient over the shear modulus."""
@@ -118,6 +121,16 @@ class Surface(Formulation):
     def set_stiff(self) -> None:
         """Set the unknowns to a small equal stretch in both directions, whose tension makes the tangent regular."""
         self.w.sub(0).interpolate(lambda X: FIRST_STRETCH / self.length * X)
+
+    @cached_property
+    def whole(self) -> WholeSurface:
+        """Triangles of the surface on all ranks."""
+        return WholeSurface(self)
+
+    @cached_property
+    def self_penetration(self) -> SelfPenetration:
+        """Check of states for layers that cross each other or a plane of symmetry."""
+        return SelfPenetration(self)
 
     def area_row(self, deformed: bool = False) -> Any:
         """Return the linear form (UFL) of the tributary areas of nodes, length^2, reference or deformed.
@@ -204,6 +217,43 @@ class Surface(Formulation):
         n = ufl.cross(f1, f2)
         l1, J = ufl.sqrt(ufl.inner(f1, f1)), ufl.sqrt(ufl.inner(n, n))
         return ufl.as_tensor([[l1, ufl.inner(f1, f2) / l1, 0], [0, J / l1, 0], [0, 0, 1 / J]])
+
+    def law_axes(self, material: Any, names: list[str]) -> Callable:
+        """Return the function that refers F to directions of the surface, for an energy that depends on the direction.
+
+        The energies of other materials take F in the axes of each triangle.
+        """
+        return self._in_directions if depends_on_direction(self.scene, names[0]) else super().law_axes(material, names)
+
+    def _in_directions(self, F: Any) -> Any:
+        """Return an F of the axes of each triangle, referred to a first direction in the surface, normal and a second.
+
+        Its rows are the deformed first axis, the normal and the other axis (UFL, shape (3, 3)).
+        """
+        t1, t2, normal = self._axes
+        d1, d2 = self._directions
+        side = ufl.inner(normal, ufl.cross(d1, d2))          # -1 keeps det F positive
+        a, b = ([F[i, 0] * ufl.inner(t1, d) + F[i, 1] * ufl.inner(t2, d) for d in (d1, d2)] for i in (0, 1))
+        return ufl.as_tensor([[a[0], 0, a[1]], [0, F[2, 2], 0], [side * b[0], 0, side * b[1]]])
+
+    @property
+    def _directions(self) -> tuple[Any, Any]:
+        """Unit vectors in the surface to which laws refer (UFL, shape (3,) each).
+
+        On a flat sheet they point along x and along y. On another surface they point upwards, along the steepest line,
+        and horizontally. There a horizontal triangle has the directions of a flat sheet.
+        """
+        x, y, z = (ufl.as_vector([float(i == k) for k in range(3)]) for i in range(3))
+        if self.mesh.flat:
+            return x, y
+        normal = self._axes[2]
+        level = ufl.cross(z, normal)
+        size = ufl.sqrt(ufl.inner(level, level))
+        steep = ufl.gt(size, NEGLIGIBLE)
+        level = level / ufl.conditional(steep, size, 1.0)
+        upward = ufl.cross(normal, level)
+        return tuple(ufl.as_vector([ufl.conditional(steep, a[i], b[i]) for i in range(3)])
+                     for a, b in ((upward, x), (level, y)))
 
     @cached_property
     def _axes(self) -> tuple[Any, Any, Any]:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -32,7 +31,6 @@ class AdmissibilityLimits:
             length of the element edge.
         penetration: largest penetration of a contact point, over the deformed wall there. Beyond it the body did not
             follow the tool. Williams' plug on coarse elements reaches 0.051.
-        beyond_plane: largest distance of a sheet beyond a plane of symmetry, over the extent of the sheet.
         largest_energy_ratio: factor c of the bound c E/W of the estimated relative error of a tool force. Penetration
             stores the energy E, the body the strain energy W. The bound matters for a body that is pressed flat.
     """
@@ -42,7 +40,6 @@ class AdmissibilityLimits:
     allowed_elements: int = 4
     depth: float = 0.25
     penetration: float = 0.15
-    beyond_plane: float = 0.02
     largest_energy_ratio: float = 3.0
 
 
@@ -141,7 +138,8 @@ class AdmissibilityCheck:
         if not self._solid:
             for deep in self._deepest_points(state, _allowed_penetration):
                 yield f"{deep.words}: the step was too long, or smaller triangles are needed there"
-            yield from self._beyond_planes(state)
+            if self._problem.scene.kinematics.components == 3:
+                yield from self._problem.forms.self_penetration.reasons(state.x)
             return
         if measures["volume_error"] > _LIMITS.volume:
             yield (f"the elements do not keep their volumes: the root mean square of J - 1 is"
@@ -215,28 +213,6 @@ class AdmissibilityCheck:
                 k = int(np.argmax(rows[:, 0]))
                 if rows[k, 0] > 1:
                     yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
-
-    def _beyond_planes(self, state: State) -> Iterator[str]:
-        """Yield for each plane of symmetry of a sheet its farthest point beyond the plane, as text; collective."""
-        problem, scene = self._problem, self._problem.scene
-        if scene.kinematics.components < 3:
-            return
-        for plane in scene.symmetry.planes:
-            vectors, numbers = self._displacements
-            own = np.asarray(numbers).reshape(-1, 3)[:vectors.dofmap.index_map.size_local]
-            x = vectors.tabulate_dof_coordinates()[:len(own)] + problem.forms.length * state.x[own]
-            beyond = (plane.position - x[:, plane.axis]) * (1 if plane.above else -1)
-            rows = gathered(problem.comm, np.column_stack([beyond, x]))
-            k = int(np.argmax(rows[:, 0]))
-            if rows[k, 0] > _LIMITS.beyond_plane * problem.forms.length:
-                yield (f"the sheet crosses the plane of symmetry {'xyz'[plane.axis]} = {plane.position:.4g} by"
-                       f" {rows[k, 0]:.3g} at (x, y, z) = ({', '.join(f'{v:.4g}' for v in rows[k, 1:])}), where its"
-                       f" mirror image is: a tool between both halves is missing")
-
-    @cached_property
-    def _displacements(self) -> Any:
-        """Space of the displacement of a sheet, and the numbers of its unknowns in the space of all fields."""
-        return self._problem.forms.space.sub(0).collapse()
 
     def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield for each tool the edge with the largest penetration over wall, if it exceeds the limit.
