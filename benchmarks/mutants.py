@@ -79,8 +79,7 @@ MUTANTS = [Mutant(*row) for row in [
      "return -1.002 * float(combined(self.comm, left, MPI.SUM))", "compression closed_forms"),
     ("problem/problem.py", "out.array_w += (control - 1) * stage.unbalanced",
      "out.array_w += (control - 0.5) * stage.unbalanced", "process"),
-    ("problem/problem.py", "self.history_variables, self._predicted = variables, predicted",
-     "self._predicted = predicted", "details"),
+    ("problem/problem.py", "self.variables, self._predicted = stored", "self._predicted = stored[1]", "details"),
     ("forms/admissible.py", "> 0))\n                    for", "> -0.5))\n                    for", "admissible"),
     ("forms/constraints.py", "active * row for (_, row), active", "row for (_, row), active", "process"),
     # materials
@@ -120,7 +119,7 @@ MUTANTS = [Mutant(*row) for row in [
      "temperature"),
     ("extensions/contact_events/event_sequence.py", "share = np.linalg.lstsq(ahead, right, rcond=1e-10)[0]",
      "share = 0 * right", "contact_events"),
-    ("solve/snap_through.py", "        problem.history_variables = kept\n        raise", "        raise", "details"),
+    ("solve/snap_through.py", "        problem.history.variables = kept\n        raise", "        raise", "details"),
     ("measures/forces.py", "self._by_control)\n            return (force - target) / self._scale, slope",
      "self._by_control)\n            return (force - target) / self._scale, 0.0", "process time derivatives"),
     ("solve/pieces.py", "rate[-1] = np.sign(change) * scale / stage.speed", "rate[-1] = scale / stage.speed",

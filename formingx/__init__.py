@@ -21,7 +21,7 @@ from .errors import ConvergenceError, InputError, Interrupted
 from .materials.constants import entropic, of_temperature
 from .materials.hyperelastic import ArrudaBoyce, Gent, Hyperelastic, MooneyRivlin, NeoHookean, Ogden, Yeoh
 from .materials.material import Material
-from .materials.published import Published, published
+from .materials.published import published
 from .materials.solidification import Solidification
 from .materials.viscoelastic import TransientNetwork, Viscoelastic
 from .measures.forces import force
@@ -40,9 +40,6 @@ from .physics.kinematics import Axisymmetric, PlaneStrain, ThreeD
 from .physics.loads import CentrifugalLoad, Gravity, Load, Pressure
 from .physics.models import DisplacementPenalty, Membrane, MixedPressure
 from .physics.supports import Clamped, PinnedNode, PrescribedDisplacement, SimplySupported, Support, Symmetry
-from .results.evaluate.point_stress import Stress
-from .results.evaluate.profile import Profile
-from .results.evaluate.stress import StressField
 from .results.path import Path
 from .results.show.report import report
 from .runs import Process, load, solve, trace
@@ -74,7 +71,6 @@ with _optional():
     from .extensions.heat.contact import ConductingTool, ContactWithTool
     from .extensions.heat.cooling import Cooling
     from .extensions.heat.expansion import ThermalExpansion
-    from .extensions.heat.result import HeatRun
     from .extensions.heat.run import heat
     from .extensions.heat.target import temperature
 with _optional():
@@ -86,19 +82,19 @@ with _optional():
 with _optional():
     from .extensions.fits import beyond_tests as _fits_checks
     from .extensions.fits.data import treloar1944
-    from .extensions.fits.fit import Fit, fit
+    from .extensions.fits.fit import fit
     from .extensions.fits.oscillation import OscillationTest
-    from .extensions.fits.tested import MeasuredRange, with_tests
+    from .extensions.fits.tested import with_tests
     from .extensions.fits.timed_test import TimedTest
 with _optional():
-    from .extensions.fits.fit_damping import Spectrum, fit_spectrum
+    from .extensions.fits.fit_damping import fit_spectrum
 with _optional():
     from .extensions.space import checks as _space_checks
     from .extensions.space import edge_checks as _edge_checks
     from .extensions.space import mould_checks as _mould_checks
     from .extensions.space import tool_checks as _tool_checks
     from .extensions.space.names import MESHES, TOOLS
-    from .extensions.space.programme import WallProgramme, wall_programme
+    from .extensions.space.programme import wall_programme
     _add(mesh, *MESHES)
     _add(tools, *TOOLS)
     del MESHES, TOOLS
@@ -107,15 +103,15 @@ with _optional():
     _add(mesh, adapted)
     del adapted
 with _optional():
-    from .extensions.stability import TopLoad, instability, top_load, with_imperfection
+    from .extensions.stability import instability, top_load, with_imperfection
 with _optional():
     from .extensions.remeshing import Remesh
 with _optional():
-    from .extensions.compare.compare import Comparison, compare
-    from .extensions.compare.compare_nodes import NodalComparison, compare_nodes, write_nodes
-    from .extensions.compare.measured_wall import MeasuredWall, WallComparison
+    from .extensions.compare.compare import compare
+    from .extensions.compare.compare_nodes import compare_nodes, write_nodes
+    from .extensions.compare.measured_wall import MeasuredWall
 with _optional():
-    from .extensions.study import Study, StudyRun, study
+    from .extensions.study import study
 with _optional():
     from .extensions.design.design import Design
     from .extensions.design.parameters import spline

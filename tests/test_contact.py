@@ -385,9 +385,9 @@ def test_scenes_without_friction_store_no_history_variables():
     mesh = fx.mesh.disc(radius=1, thickness=0.1, elements=(4, 1))
     free = Problem(fx.Scene(mesh=mesh, materials=fx.NeoHookean(c10=1.0),
                             supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom")]))
-    assert free.contacts == [] and not free.has_history
-    assert not Problem(cup("none", (4, 1))).has_history
-    assert len(Problem(cup("stick", (4, 1))).histories) == 1
+    assert free.contacts == [] and not free.history.path_dependent
+    assert not Problem(cup("none", (4, 1))).history.path_dependent
+    assert len(Problem(cup("stick", (4, 1))).history.parts) == 1
 
 
 @pytest.mark.quick

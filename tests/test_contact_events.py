@@ -26,7 +26,7 @@ scene = fx.Scene(mesh=fx.mesh.disc(radius=10.0, thickness=0.3, elements=(20, 1))
                  materials=fx.MooneyRivlin(c10=50.0, c01=15.0), loads=[fx.Pressure("bottom")],
                  supports=[fx.Symmetry("axis"), fx.Clamped("rim")], contacts=[fx.Contact("top", mould, "stick")])
 path = fx.trace(scene, until=fx.pressure(30.0), progress=False)
-assert not path.problem.limit.predicts_events
+assert not path.problem.contact.limit.predicts_events
 print(fx.__file__, path.counts.steps, *path.profile().thickness)
 """
 
@@ -64,9 +64,10 @@ def test_a_predicted_step_ends_near_its_state():
     point = int(np.flatnonzero(~touching & (problem.contacts[0].rule.area > 0))[0])
     with problem.state_context(old):
         length = curve.progress(old, new)
-        trial = TrialStep(old.x, old.control, old.direction, old.slope, length, problem.limit.predict(curve, old))
-        problem.limit.length(trial)
-        dx, dc = problem.limit.prepare(trial)
+        limit = problem.contact.limit
+        trial = TrialStep(old.x, old.control, old.direction, old.slope, length, limit.predict(curve, old))
+        limit.length(trial)
+        dx, dc = limit.prepare(trial)
         V, steps = response_at(curve, old).to_points([np.array([point])])
         F = problem.x.duplicate()
         x = problem.x.duplicate()
@@ -101,7 +102,7 @@ def test_sliding_points_move_as_in_the_tangent():
     sliding = 0
     for old in path.states[2:-1]:
         with problem.state_context(old):
-            faces = problem.active_contacts
+            faces = problem.contact.faces
             ahead = ContactEventSequence(faces, n, old.x, old.control, old.direction, old.slope,
                                          response_at(curve, old), 4)
             law = faces[1].tractions(old.x[:n], old.control)
@@ -201,7 +202,7 @@ def test_a_plug_with_friction_takes_one_gap_closure_a_step():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)),
                      materials=fx.MooneyRivlin(c10=0.35, c01=0.05), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", mould, 0.3), fx.Contact("bottom", tool, 0.3, direction=(0, 1))])
-    limit = Problem(scene).limit
+    limit = Problem(scene).contact.limit
     predictor = ContactEventPredictor(limit)
     allowed = [predictor.allowed(contact) for contact in limit.active_contacts]
     assert predictor.active and allowed == [3, 1]
@@ -215,7 +216,7 @@ def test_no_events_are_predicted_for_a_plug_without_stick(friction):
                      materials=fx.MooneyRivlin(c10=17.0, c01=1.0), contacts=[ball],
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")])
     path = fx.trace(scene, until=fx.travel(8.0 if friction == "none" else 0.5), progress=False)
-    assert not path.problem.limit.predicts_events and path.counts.failures < 0.2 * path.counts.steps
+    assert not path.problem.contact.limit.predicts_events and path.counts.failures < 0.2 * path.counts.steps
 
 
 @pytest.mark.thorough
@@ -232,7 +233,7 @@ import sys
 sys.path.insert(0, "tests")
 from test_contact import cup, form
 path = form(cup("stick", (10, 1), points=3), 20.0)
-print(path.problem.limit.predicts_events, path.profile().thickness[0])
+print(path.problem.contact.limit.predicts_events, path.profile().thickness[0])
 """
 
 

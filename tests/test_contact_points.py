@@ -9,7 +9,6 @@ from test_derivatives import difference, random_state, residual
 import formingx as fx
 from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
-from formingx.solve.local_contact import unit_forces
 
 
 @pytest.mark.quick
@@ -42,7 +41,7 @@ def test_unit_forces_are_added_forces(points):
     problem = Problem(cup("none", elements=(4, 1), points=points))
     face, x = problem.contacts[0], random_state(problem)[0]
     chosen = np.arange(len(face.points))[1:-1:2]
-    found, before = unit_forces(problem, [face], [chosen]), residual(problem, 0.1)(x)
+    found, before = problem.contact.unit_forces([chosen]), residual(problem, 0.1)(x)
     columns = []
     for point in chosen:
         for way in range(2):
@@ -138,7 +137,7 @@ def test_ranks_agree_and_continue_runs_of_other_ranks(tmp_path):
 
 def test_saved_histories_belong_to_their_points():
     """Rows in another order are found, and moved points are refused."""
-    history = Problem(plugged()).histories[0]
+    history = Problem(plugged()).history.parts[0]
     data = history.save(history.get())
     data["penalty"] = np.arange(float(len(data["points"])))[::-1]
     data["points"] = np.array(data["points"])[::-1]

@@ -162,7 +162,7 @@ def test_a_restarted_run_equals_an_uninterrupted_one(tmp_path):
 @pytest.mark.thorough
 def test_saved_temperatures_belong_to_their_points():
     """Of the body and of a conducting tool: rows in another order are found, and moved points are refused."""
-    history = Problem(pressed()).histories[-1]
+    history = Problem(pressed()).history.parts[-1]
     data = history.save(history.get())
     for part, key in ((data, "temperature"), (data["tools"][0], "excess")):
         part[key] = np.arange(float(np.size(part[key]))).reshape(np.shape(part[key]))[::-1]
@@ -265,12 +265,12 @@ def test_a_face_that_bridges_a_fillet_between_its_nodes_counts_as_touching():
         path = fx.Process(scene).run([fx.Stage("blow", control="air", until=fx.pressure(0.15), duration=1.0),
                                       fx.Stage("hold", duration=2.0)], progress=False)
         found.append(path.temperature([[R, Z] for R in (0.0, 10.0, 20.0, 32.1, 38.0) for Z in (0.0, 0.5, 1.0)]))
-        error, = path.problem.histories[-1].errors_in_space([path.last])
+        error, = path.problem.history.parts[-1].errors_in_space([path.last])
         assert error < 2.0                                       # of 130
     assert np.abs(found[0] - found[1]).max() < 2.0
     warned, = [float(re.search("about (.*?) degrees", finding.text).group(1)) for finding in path.findings()
                if finding.about == "temperature"]
-    largest = max(path.problem.histories[-1].errors_in_space(path.states[1:]))
+    largest = max(path.problem.history.parts[-1].errors_in_space(path.states[1:]))
     assert largest > 20.0 and warned < 0.7 * largest             # ends of contacts that moved on are left out
 
 

@@ -282,7 +282,7 @@ def test_runs_of_designs_do_not_change_the_scene():
         return fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.05, elements=(8, 1)), contacts=[mould], **CAN,
                         materials=fx.NeoHookean(c10=c10)), fx.pressure(0.06)
     run = fx.Design(build, {"c10": (0.5, 0.4, 0.6)}).run()
-    assert mould.nodes_per_step is None and not run.path.problem.limit.predicts_events
+    assert mould.nodes_per_step is None and not run.path.problem.contact.limit.predicts_events
 
 
 @pytest.mark.thorough

@@ -94,7 +94,8 @@ def test_a_step_that_closes_a_whole_region_is_refused():
     x = np.zeros(problem.n_owned)
     near, far = (d / problem.forms.length for d in (0.05, 0.11))
     rest, close, deep = (TrialStep(x, control, x, 0.0, 1.0) for control in (0.0, near, far))
-    assert problem.limit.check(rest, close, 1.0) is None and "too many" in problem.limit.check(close, deep, 1.0).reason
+    limit = problem.contact.limit
+    assert limit.check(rest, close, 1.0) is None and "too many" in limit.check(close, deep, 1.0).reason
 
 
 def test_rest_is_free_of_stress_under_the_penalty():
@@ -217,19 +218,19 @@ def test_a_failed_snap_through_restores_history_variables():
     path = fx.Process(sheet(RELAXES, elements=(4, 1))).run(
         [Stage("blow", control="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
     with path.problem.state_context(path.last) as problem:
-        before = problem.history_variables
+        before = problem.history.variables
         with pytest.raises(snap_through.NoEquilibrium):
             snap_through.snap_through(path.record.curve, path.last, 0.01, False, snap_through.SnapThrough(), 1)
-        assert all(one is other for one, other in zip(problem.history_variables, before, strict=True))
+        assert all(one is other for one, other in zip(problem.history.variables, before, strict=True))
 
 
 def test_state_context_restores_history_variables():
     path = fx.Process(sheet(RELAXES, elements=(4, 1))).run(
         [Stage("blow", control="air", until=fx.pole_height(0.2), speed=0.1)], progress=False)
-    problem, before = path.problem, path.problem.history_variables
+    problem, before = path.problem, path.problem.history.variables
     with problem.state_context(path.states[1]):
-        assert any(inside is not outside for inside, outside in zip(problem.history_variables, before, strict=True))
-    assert all(restored is held for restored, held in zip(problem.history_variables, before, strict=True))
+        assert any(inside is not outside for inside, outside in zip(problem.history.variables, before, strict=True))
+    assert all(restored is held for restored, held in zip(problem.history.variables, before, strict=True))
 
 
 def test_every_mutant_stands_in_its_file(monkeypatch):

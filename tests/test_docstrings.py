@@ -15,9 +15,7 @@ MODULES = [m.name for m in pkgutil.walk_packages(fx.__path__, "formingx.") if no
 
 
 # bases, what calls give back (their examples are those of the calls), and an end by Ctrl-C
-WITHOUT = {"Comparison", "Damping", "Fit", "HeatRun", "Interrupted", "Load", "Material", "MeasuredRange",
-           "NodalComparison", "Published", "Spectrum", "Study", "StudyRun", "Support", "TopLoad", "tools.Pot",
-           "tools.SolidTool", "WallComparison"}
+WITHOUT = {"Damping", "Interrupted", "Load", "Material", "Support", "tools.Pot", "tools.SolidTool"}
 
 
 def examples(*modules):

@@ -32,7 +32,7 @@ class Arch(Equations):
     spring = 3.0
 
     def __init__(self):
-        self.comm, self.history_variables, self.clock, self.force_scale = MPI.COMM_SELF, [], 0.0, 0.0
+        self.comm, self.force_scale = MPI.COMM_SELF, 0.0
         self.matrix = PETSc.Mat().createAIJ((2, 2), nnz=2, comm=self.comm)
         self.x, self._setting = self.matrix.createVecRight(), StepData([0.0, 0.0], [1.0, 0.0], [])
 

@@ -146,7 +146,7 @@ def test_error_of_few_layers(layers, biot):
     path = fx.Process(chilled_from_below(layers, biot)).run([fx.Stage("chill", duration=0.3 * wall_time)],
                                                             progress=False)
     late = [state for state in path.states if state.time >= 0.01 * wall_time]
-    error = path.problem.histories[-1].errors_in_space(late).max() / 130
+    error = path.problem.history.parts[-1].errors_in_space(late).max() / 130
     assert 1 / 2.5 < error / checks.error_of_layers(layers, biot) < 2.5
 
 

@@ -81,9 +81,9 @@ def test_a_trial_state_far_back_in_time_raises_no_warning():
     problem, F = path.problem, path.problem.x.duplicate()
     with problem.state_context(path.last), warnings.catch_warnings():
         warnings.simplefilter("error")
-        problem.clock -= 0.05
+        problem.history.clock -= 0.05
         problem.residual(problem.x, path.last.control, F)
-        problem.clock += 0.05
+        problem.history.clock += 0.05
     assert not np.isfinite(F.norm())
 
 

@@ -124,9 +124,9 @@ def test_internal_variables_are_computed_four_times_per_step(monkeypatch):
     assert len(path) > 8 and calls[0] <= 4 * (path.counts.steps + path.counts.failures) + 2
     before, last = path.states[-2:]
     with path.problem.state_context(last) as problem:
-        problem.history_variables = before.history_variables
-        problem.advance(last.x, last.control)
-        for name, values in problem.history_variables[0].values.items():
+        problem.history.variables = before.history_variables
+        problem.history.advance(last.x, last.control)
+        for name, values in problem.history.variables[0].values.items():
             np.testing.assert_array_equal(values, last.history_variables[0].values[name])
 
 

@@ -25,13 +25,10 @@ class Face:
         law = Law(tools.Tool([(0.0, 0.0), (9.0, 0.0)]), np.full(1, np.inf), np.full(1, K), THETA, 1e-3)
         here = np.array([[4.0, -0.5 * THETA]])
         history = law.start(here - [[slip, 0.0]])
-        self.points, self.scale, self.rule, self.law = here, np.ones(1), self, law
+        self.points, self.scale, self.law = here, np.ones(1), law
         self.increment = Increment(law, history, here)
         self.increment.tractions(here)
         self.increment.linearise(here)
-
-    def add_unit_forces(self, E, points):
-        E += np.eye(2)
 
     def relative_motion(self, dx, step):
         return dx[None]
@@ -46,8 +43,8 @@ def test_a_point_that_is_pulled_along_its_tool_and_hardly_pressed_to_it(inside, 
     face, free = Face(slip=0.3), np.array([0.1, -0.5 * THETA + inside])
     f0, S0 = (values[0] for values in face.increment.last_tractions(np.array([0])))
     tangent = np.eye(2) + C @ S0                            # that of the body with the law as it was linearised
-    problem = SimpleNamespace(comm=MPI.COMM_SELF, present=[face], constrained=np.zeros(0, dtype=int),
-                              x=PETSc.Vec().createSeq(2))
+    contact = SimpleNamespace(faces=[face], unit_forces=lambda chosen: np.eye(2))
+    problem = SimpleNamespace(comm=MPI.COMM_SELF, contact=contact)
     solver = SimpleNamespace(solve_all=lambda E: np.linalg.solve(tangent, C @ E))
     law = face.increment.law_at(np.array([0]))
 
@@ -63,7 +60,7 @@ def test_a_point_that_is_pulled_along_its_tool_and_hardly_pressed_to_it(inside, 
     assert depth == pytest.approx(-0.5 * THETA, abs=1e-3 * THETA)
     dx = PETSc.Vec().createSeq(2)
     dx.array_w[:] = np.linalg.solve(tangent, free - C @ f0)
-    points = local_contact._Points(problem, [face], [np.array([0])], solver, lambda V: np.zeros(V.shape[1]))
+    points = local_contact._Points(problem, [np.array([0])], solver, lambda V: np.zeros(V.shape[1]))
     found = points.solve(dx, 0.0)
     assert found is not None
     assert dx.array_r + found[0] == pytest.approx(along(depth), abs=1e-3 * THETA)

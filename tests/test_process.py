@@ -428,7 +428,7 @@ def test_ranks_agree():
 
 
 def test_frictionless_processes_have_no_history_variables():
-    assert not Problem(plugged()).has_history and Problem(gripped()).contacts == []
+    assert not Problem(plugged()).history.path_dependent and Problem(gripped()).contacts == []
 
 
 def test_a_restart_with_other_stages_is_refused():

@@ -86,10 +86,10 @@ def test_contact_events_are_not_predicted(monkeypatch):
     """They arrive one a step, on all meshes."""
     from formingx.extensions.contact_events import prediction
     monkeypatch.setattr(prediction, "MAX_CLOSURES", 0.5)
-    assert pressed("stick", 0.1).problem.limit.predicts_events
+    assert pressed("stick", 0.1).problem.contact.limit.predicts_events
     path = pressed("stick", 0.5, remesh=fx.Remesh(size=0.1, corner=0.07, volume_ratio=(0.8, 1.2)))
     segments = path.record.segments
-    assert len(segments) > 1 and not any(segment.problem.limit.predicts_events for segment in segments)
+    assert len(segments) > 1 and not any(segment.problem.contact.limit.predicts_events for segment in segments)
 
 
 @pytest.mark.thorough

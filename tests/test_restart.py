@@ -105,7 +105,7 @@ def test_a_state_is_stored_with_one_set_of_history_variables(whole):
     assert before.history.position.shape == path.states[-1].history_variables[0].history.position.shape
     assert not any(state.history_variables_before for state in fx.load(folder, scene).states)
     data = checkpoint_data.read_data(folder, len(path) - 1)
-    assert len(data["memory"]) == len(path.problem.histories) and "history_variables_before" not in data
+    assert len(data["memory"]) == len(path.problem.history.parts) and "history_variables_before" not in data
 
 
 def test_a_run_that_fails_leaves_its_states(tmp_path):

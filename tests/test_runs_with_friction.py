@@ -126,6 +126,6 @@ def test_a_snap_through_of_a_block_has_no_wall_warning():
     from formingx.results.evaluate import snaps
     wall = iter((np.array([1.0, 1.0]), np.array([1.0, np.nan])))
     path = SimpleNamespace(states=[SimpleNamespace(kind=kind) for kind in ("start", "step", "jump")],
-                           problem=SimpleNamespace(has_history=True),
+                           problem=SimpleNamespace(history=SimpleNamespace(path_dependent=True)),
                            profile=lambda state: SimpleNamespace(wall_ratio=next(wall), reference_radius=np.zeros(2)))
     assert snaps.findings(snaps.largest(path)) == []

@@ -72,7 +72,7 @@ def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
     for problem, path, other, most in ((b, here, there, 0.01), (a, there, here, 0.01), (a, there, there, 1e-12)):
         with problem.state_context(path.last):
             transfer_histories(other.problem, other.last, problem, path.last.x, path.last.control)
-            found, = problem.history_variables
+            found, = problem.history.variables
         wanted, = path.last.history_variables
         assert found.time == wanted.time
         for name, values in wanted.values.items():
@@ -83,10 +83,10 @@ def test_internal_variables_are_those_of_a_run_on_the_other_mesh():
 def test_temperatures_of_body_and_tools_are_transferred():
     path, fine = press(pressed()), Problem(fx.Scene(**parts(pressed(), elements=(12, 2))))
     variables = path.last.history_variables
-    T = variables[-1]._replace(temperature=quadratic_of(path.problem.histories[-1]._body.points))
+    T = variables[-1]._replace(temperature=quadratic_of(path.problem.history.parts[-1]._body.points))
     there = replace(path.last, history_variables=[*variables[:-1], T])
     transfer_histories(path.problem, there, fine, np.zeros(fine.x.getLocalSize()), 0.0)
-    body, found = fine.histories[-1]._body, fine.history_variables[-1]
+    body, found = fine.history.parts[-1]._body, fine.history.variables[-1]
     assert found.temperature == pytest.approx(quadratic_of(body.points), rel=1e-9)
     assert np.array_equal(fine.temperature.T.x.array[: len(found.temperature)], found.temperature)
     excess, kept = found.tool_excess[0], variables[-1].tool_excess[0]
@@ -111,7 +111,7 @@ def test_contact_state_is_restored_after_a_transfer(points):
     path = form(cup(0.3, elements=(12, 1), points=points), 10.0)
     here, kept = Problem(path.problem.scene), path.last.history_variables[0]
     transfer_histories(path.problem, path.last, here, path.last.x, path.last.control)
-    found = here.history_variables[0]
+    found = here.history.variables[0]
     touched = kept.history.distance > -here.contacts[0].law.theta
     assert touched.sum() > 3 and np.abs(kept.history.slip).max() > 0
     assert found.history.position == pytest.approx(kept.history.position, rel=1e-9, abs=1e-12)

@@ -87,7 +87,7 @@ def test_a_file_without_the_motion_of_a_material_is_refused():
     """Each internal variable must be in the file."""
     path = run(block(fx.TransientNetwork(None, [(1.0, 0.1)])), Stage("pull", amplitudes={"pull": [(0, 0), (1, 0.5)]}),
                accuracy="draft")
-    history, = path.problem.materials
+    history, = path.problem.history.materials
     with path.problem.state_context(path.last):
         kept = history.save(history.get())
         assert kept["values"]["pace"].min() > 0

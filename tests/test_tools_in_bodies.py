@@ -59,7 +59,7 @@ def test_paths_of_sliding_points_may_cut_a_convex_tool():
             other = x.copy()
             other[contact.rule.dofs[node, 1]] += by / problem.forms.length
             trials = [TrialStep(at, path.last.control, x, 0.0, 1.0) for at in (x, other)]
-            assert problem.limit.passes_through(*trials) == passes
+            assert problem.contact.limit.passes_through(*trials) == passes
 
 
 def ridge(elements, at, points="nodes", width=30.0, fillet=0.0):

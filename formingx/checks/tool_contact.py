@@ -75,7 +75,7 @@ def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
 
     with problem.state_context(state):
         return any(force(contact) > ROUND_OFF * contact.force_scale for contact in contacts
-                   if contact in problem.active_contacts)
+                   if contact in problem.contact.faces)
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:

@@ -38,7 +38,7 @@ class StepError:
     def __init__(self, problem: Any):
         self._problem, self._forms = problem, problem.forms
         forms = self._forms
-        self._materials = problem.materials
+        self._materials = problem.history.materials
         heat = len(self._materials) < len(forms.histories)
         terms = [terms for terms in forms.terms if terms.has_history or heat and terms.depends_on_temperature]
         self._stresses = [_Stress(forms, entry, entry.step_energy) for entry in terms]
@@ -61,7 +61,7 @@ class StepError:
         step = end - old.time if self._stresses else 0.0
         first, found = (self._stresses_at(old.x, old.time), self._stresses_at(x, end)) if step > 0 else ([], [])
         forms.clock = clock
-        after = self._problem.predict(old, x, control)
+        after = self._problem.history.predict(old, x, control)
         for history, variables in zip(forms.histories, start):
             if history in self._materials or not step > 0:
                 history.put(variables)

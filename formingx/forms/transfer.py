@@ -133,10 +133,10 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
         def on_this_mesh(points: np.ndarray) -> np.ndarray:
             """Map reference points of the mesh of `source`, shape (n, 2), to the mesh of `problem`."""
             return points + Probe(source, points).displacement_in(state) if moved else points
-        same = len(problem.histories) == len(source.histories) and not moved
-        n = len(problem.histories) if same else len(problem.forms.histories)
-        for mine, other, kept in zip(problem.histories[-n:], source.histories[-n:], state.history_variables[-n:],
-                                     strict=True) if n else ():
+        same = len(problem.history.parts) == len(source.history.parts) and not moved
+        n = len(problem.history.parts) if same else len(problem.forms.histories)
+        pairs = zip(problem.history.parts[-n:], source.history.parts[-n:], state.history_variables[-n:], strict=True)
+        for mine, other, kept in pairs if n else ():
             mine.put(mine.transfer(other, kept, x[: problem.n_owned], control, on_this_mesh))
 
 

@@ -45,7 +45,7 @@ class _Nodal(_Recorded):
         self._contacts = problem.contacts if contacts is None else contacts
 
     def value(self, x, control):
-        active = [c for c in self._contacts if c in self._problem.active_contacts]
+        active = [c for c in self._contacts if c in self._problem.contact.faces]
         return float(self._reduce([0.0, *[self._quantity(contact, x.array_r, control) for contact in active]]))
 
 

@@ -181,7 +181,7 @@ def _deformed_position(problem: Any, state: Any, point: np.ndarray) -> np.ndarra
 
 def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
     """Return the masks of the locally owned points in contact, shape (n,), for every active contact."""
-    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.active_contacts]
+    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.contact.faces]
 
 
 def _status_changes(problem: Any, attempt: Any) -> int | None:
@@ -189,11 +189,11 @@ def _status_changes(problem: Any, attempt: Any) -> int | None:
 
     attempt: the last iterate x and control, with their last corrections dx and dcontrol.
     """
-    if not problem.active_contacts:
+    if not problem.contact.faces:
         return None
     n, count = problem.forms.space.dofmap.index_map.size_local, 0
     before = attempt.x - attempt.dx, attempt.control - attempt.dcontrol
-    for contact, a, b in zip(problem.active_contacts, _touching(problem, *before),
+    for contact, a, b in zip(problem.contact.faces, _touching(problem, *before),
                              _touching(problem, attempt.x, attempt.control), strict=True):
         slides = [contact.law.tractions(contact.positions(x[:n], c), contact.history).sense
                   for x, c in (before, (attempt.x, attempt.control))]

@@ -1,4 +1,4 @@
-"""Discrete equations of a scene, F(x, control) = 0: the interface of the solver. All objects are created once.
+"""Discrete equations of a scene, F(x, control) = 0, and their parts. All objects are created once.
 
 The vector x holds the fields (dimensionless, see `formulation`). One Lagrange multiplier for each `ConstrainedMean`
 follows at the end of the last rank's entries.
@@ -75,20 +75,15 @@ class Problem:
         n_owned: number of field unknowns that this rank owns.
         setting: current step data (`StepData`).
         constrained: local numbers of the constrained unknowns that this rank owns, shape (n,).
-        has_kinks: True if contacts are active.
-        has_history: True if F depends on earlier states.
-        body_has_history: True if materials or the temperature have history variables.
-        singular_unloaded: True if the body in the reference configuration has no stiffness in some direction.
         matrix: the tangent, reassembled by `tangent`.
         contacts: contacts of the scene (`FaceContact`).
-        active_contacts: contacts that are active in the current stage.
-        histories: history variables on which F depends (`History`): contacts, then materials, then the temperature.
-        limit: limits that the contacts set to the length of a step (`StepLimit`).
+        contact: the active ones and their limits to a step (`Contacts`).
+        history: history variables and process time (`ProblemHistories`).
+        reference: the body in the reference configuration (`UnloadedBody`).
+        description: names and units (`SceneDescription`).
         admissible: check for inverted elements and points beyond the axis, and volume ratios (`Admissible`).
         force_scale: norm of all support forces at the state whose residual was last computed.
     """
-
-    _predicted: tuple[Any, list[Any]] = None, []             # x, and the history variables of the forms at x
 
     def __init__(self, scene: Scene):
         _compat.collect_communicators()
@@ -103,10 +98,8 @@ class Problem:
         forms.faces = self.contacts
         if scene.heat is not None:                              # after the materials, which heat it
             forms.histories.append(scene.heat.history(self))
-        self.histories: list[History] = [*(c for c in self.contacts if c.has_history), *forms.histories]
-        self.has_history, self.body_has_history = bool(self.histories), bool(forms.histories)
-        self.singular_unloaded = forms.singular_unloaded
-        self.limit = StepLimit(self)
+        self.contact, self.history = Contacts(self), ProblemHistories(self)
+        self.reference, self.description = UnloadedBody(self), SceneDescription(self)
         self.admissible = forms.admissible()
         self._constraints = Constraints(forms, self.assemble)
         last = self.comm.rank == self.comm.size - 1             # it has the multipliers
@@ -158,10 +151,9 @@ class Problem:
         """Derivative of the constrained unknowns with respect to the control, for the n unknowns `constrained`."""
         return self._stage.rate
 
-    @property
-    def active_set(self) -> Any:
-        status = [c.increment.status.tobytes() for c in self.active_contacts]
-        return tuple(map(tuple, listed(self.comm, status))) if status else None
+    def constrained_values(self, control: float) -> np.ndarray:
+        """Return the prescribed values of the n unknowns `constrained` at a control, shape (n,), dimensionless."""
+        return np.asarray(self._stage.base + self._stage.rate * control)
 
     @property
     def temperature(self) -> Temperature | None:
@@ -178,12 +170,6 @@ class Problem:
             self.forms.w.x.scatter_forward()
         for coefficients in self.forms.refreshed:
             coefficients.refresh()
-
-    def motion(self, control: float) -> np.ndarray:
-        """Return the prescribed values at the constrained unknowns, and 0 elsewhere; shape (n,), dimensionless."""
-        values = np.zeros(self.x.getLocalSize())
-        values[self.constrained] = self._stage.base + self._stage.rate * control
-        return values
 
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
         """Set the fields and the control of the forms from a vector of unknowns.
@@ -212,10 +198,6 @@ class Problem:
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
         self.fill(out, self._metric * a.array_r[: self.n_owned])
-
-    def stiff_state(self, out: PETSc.Vec) -> None:
-        self.forms.set_stiff()
-        self.fill(out, self.forms.w.x.array[: self.n_owned])
 
     def assemble(self, form: Any) -> np.ndarray:
         """Assemble a compiled linear form at the current fields and control; owned entries, shape (n,)."""
@@ -281,7 +263,7 @@ class Problem:
         fields: its locally owned field unknowns, shape (n,). The forces are dimensionless, shape (n,).
         """
         values = self.assemble(self._residual)
-        for contact in self.active_contacts:
+        for contact in self.contact.faces:
             contact.add_residual(values, fields, control)
         return values
 
@@ -301,45 +283,23 @@ class Problem:
         with self.state_context(state):
             return self.admissible.volume_error_away(places, distance)
 
-    def begin(self, old: Any = None) -> None:
-        for contact in self.active_contacts:
-            contact.begin(*((None, 0.0) if old is None else (old.x[: self.n_owned], old.control)))
-
-    def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
-        if self.contacts:
-            values = F.array_r[: self.n_owned].copy()
-            for contact in self.active_contacts:
-                contact.linearise(values, x.array_r[: self.n_owned], control)
-            values[self.constrained] = F.array_r[: self.n_owned][self.constrained]
-            F.array_w[: self.n_owned] = values
-
     def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> PETSc.Mat:
         self.set_state(x, control)
         fields = x.array_r[: self.n_owned]
         return self._tangent.matrix.fill([(c.rule.dofs, c.tangent(fields, control, one_sided))
-                                          for c in self.active_contacts])
+                                          for c in self.contact.faces])
 
     def viscosity(self) -> Viscosity:
         return Viscosity(self._viscosity, self._stage.active.bcs)
 
     @cached_property
-    def _step_error(self) -> StepError:
-        return StepError(self)
-
-    def step_error(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
-        return self._step_error.estimate(past, share, x, control)
-
-    @cached_property
     def _viscosity(self) -> Any:
         return self.forms.compile(self.forms.viscosity())
-
-    def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
-        return [contact.one_sided_change(x.array_r[: self.n_owned], control) for contact in self.active_contacts]
 
     def control_derivative(self, x: PETSc.Vec, control: float, out: PETSc.Vec, one_sided: bool = False) -> None:
         self.set_state(x, control)
         values = self._tangent.by_control(self.setting.rate, self.assemble, self.n_owned)
-        for contact in self.active_contacts:
+        for contact in self.contact.faces:
             contact.add_control_derivative(values, x.array_r[: self.n_owned], control, one_sided)
         values[self.constrained] = -self._stage.rate
         self.fill(out, values)
@@ -347,66 +307,9 @@ class Problem:
             out.array_w += self._stage.unbalanced
 
     @property
-    def materials(self) -> list[ConstitutiveHistory]:
-        """History of each material with internal variables or past states (`ConstitutiveHistory`)."""
-        return [history for history in self.forms.histories if isinstance(history, ConstitutiveHistory)]
-
-    @property
-    def relaxes(self) -> bool:
-        """True if the body is rate-dependent, through a material or through its temperature."""
-        return any(not isinstance(history, ConstitutiveHistory) or history.rate_dependent
-                   for history in self.forms.histories)
-
-    @property
     def time(self) -> float:
         """Process time at the current load parameter (control)."""
         return self.forms.time_at(self.control)
-
-    @property
-    def clock(self) -> float:
-        """Process time at control 0; a run that chooses its own time steps sets it before each step."""
-        return self.forms.clock
-
-    @clock.setter
-    def clock(self, time: float) -> None:
-        self.forms.clock = time
-
-    def time_at(self, control: float) -> float:
-        return self.forms.time_at(control)
-
-    @property
-    def history_variables(self) -> list[Any]:
-        """History variables of the last accepted state: the result of `History.get` for each of `histories`."""
-        return [history.get() for history in self.histories]
-
-    @history_variables.setter
-    def history_variables(self, variables: list[Any]) -> None:
-        self._predicted = None, []
-        for history, stored in zip(self.histories, variables, strict=True):
-            history.put(stored)
-
-    def advance(self, x: np.ndarray, control: float) -> None:
-        if self.forms.histories:
-            self.set_fields(x, control)
-        known = self._predicted[1] if self._predicted[0] is x else []
-        for history in self.histories[: len(self.histories) - len(known)]:
-            history.advance(x[: self.n_owned], control)
-        for history, variables in zip(self.forms.histories, known):
-            history.put(variables)
-        self._predicted = None, []
-
-    def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
-        """Return the history variables of materials and temperature at the end of a step that is not yet accepted.
-
-        They are stored, and `advance` uses them if it accepts the same x, shape (n,). The caller must restore the
-        earlier ones.
-        """
-        self.set_fields(x, control)
-        for history in self.forms.histories:
-            history.advance(x[: self.n_owned], control, start)
-        after = [history.get() for history in self.forms.histories]
-        self._predicted = x, after
-        return after
 
     @contextlib.contextmanager
     def state_context(self, state: Any) -> Iterator[Self]:
@@ -416,14 +319,14 @@ class Problem:
         entries), control, time, setting (`StepData` as plain data, or empty) and history_variables.
         """
         fields, control, clock = self._fields.copy(), self.control, self.forms.clock
-        stage, variables, x, predicted = self._stage, self.history_variables, self.x.array_r.copy(), self._predicted
+        stage, history, x = self._stage, self.history.stored(), self.x.array_r.copy()
         try:
             self.restore(state)
             self.x.array_w[:] = state.x
             self.set_state(self.x, state.control)
             yield self
         finally:
-            self.history_variables, self._predicted = variables, predicted
+            self.history.put_back(history)
             self._set_stage(stage)
             self.forms.clock = clock
             self.x.array_w[:] = x
@@ -434,8 +337,8 @@ class Problem:
 
         `state` has the attributes of `state_context`.
         """
-        if self.has_history:
-            self.history_variables = state.history_variables
+        if self.history.path_dependent:
+            self.history.variables = state.history_variables
         if state.setting:
             self.enter(StepData(**state.setting), state.x, state.control)
         if not self.setting.rate[-1]:
@@ -475,22 +378,10 @@ class Problem:
         for contact in self.contacts:
             i = number[id(contact.contact)]
             contact.enter(setting.base[i], setting.rate[i], i not in setting.inactive)
-        self.active_contacts = [contact for contact in self.contacts if contact.active]
-        self.setting, self.constrained, self.has_kinks = setting, stage.constrained, bool(self.active_contacts)
+        self.contact.faces = [contact for contact in self.contacts if contact.active]
+        self.setting, self.constrained = setting, stage.constrained
         if "_tangent" in vars(self):
             self._tangent.enter(stage.active, setting.rate, before is None or before.active is not stage.active)
-
-    def examine(self, last: Any, attempt: Any) -> Examination:
-        return Examination(self, last, attempt)
-
-    def activate(self, number: int, x: np.ndarray, control: float) -> None:
-        for contact in self.contacts:
-            if contact.contact in self.scene.items[number: number + 1]:             # a law of heat has no item
-                contact.activate(x, control)
-                depth = penetration(contact, x, control)
-                if depth > 1e-6 * self.forms.length:
-                    raise InputError(f"{contact.contact!r} takes part again where the body is, which reaches"
-                                     f" {depth:.6g} into the tool")
 
     def followed(self, points: np.ndarray) -> np.ndarray:
         """Return the positions on this mesh of material points on the first mesh of a run, shape (n, 2), length."""
@@ -503,47 +394,216 @@ class Problem:
         call_on_all_ranks(self.comm, [self.forms.update_temperature,
                                       *(contact.update_temperature for contact in self.contacts)])
 
-    @property
-    def why_not_finite(self) -> str:
-        limits = {f"{m} was stretched beyond its limit, I1 < {m.largest_I1:.6g}": None
-                  for m in self.scene.materials.values() if m.largest_I1 < np.inf}
-        strained = limits or ["a material was strained beyond what its law allows"]
-        return ", or ".join(["an element turned inside out", *strained])
-
-    def shown(self, control: float) -> tuple[str, float]:
-        number, items = self.setting.controlled, self.scene.items
-        if number is None:
-            return "control", control
-        name = "process time" if number == len(items) else self.scene.column(items[number]).replace("_", " ")
-        return name, self.forms.scales[number] * self.setting.amplitude(number, control)
-
-    def implausible(self, control: float) -> str | None:
-        return implausible(self.scene, self.control_kind, self.shown(control)[1])
-
-    @property
-    def control_kind(self) -> str | None:
-        number, items = self.setting.controlled, self.scene.items
-        return None if number is None else "time" if number == len(items) else items[number].quantity
-
-    @property
-    def fixed_loads(self) -> list[str]:
-        return [repr(load) for load in self.scene.loads if not load.driven]
-
-    @cached_property
-    def main_columns(self) -> list[str]:
-        return ["process_time", *map(self.scene.column, self.scene.drivable), "pole_height", "pole_stretch"]
-
-    @property
-    def scales(self) -> Sequence[float]:
-        return self.forms.scales
-
-    @property
-    def units(self) -> tuple[float, float]:
-        """Units of the dimensionless energy of the whole part (stress length^3) and of length, in the user's units."""
-        return self.scene.symmetry_factor * self.forms.stress * self.forms.volume, self.forms.length
-
     def destroy(self) -> None:
         """Free the PETSc objects (collective)."""
         if "_tangent" in vars(self):
             self._tangent.matrix.destroy()
         self.x.destroy()
+
+
+class Contacts:
+    """Contacts of a problem: the active ones, their linearisation, and the limits that they set to a step.
+
+    Args:
+        problem: the `Problem`.
+
+    Attributes:
+        faces: contacts that are active in the current stage.
+        limit: limits to the length of a step (`StepLimit`).
+    """
+
+    def __init__(self, problem: Problem):
+        self._problem, self._n = problem, problem.n_owned
+        self.faces: list[FaceContact] = []
+        self.limit = StepLimit(problem)
+
+    @property
+    def status(self) -> Any:
+        status = [face.increment.status.tobytes() for face in self.faces]
+        return tuple(map(tuple, listed(self._problem.comm, status))) if status else None
+
+    def begin(self, old: Any = None) -> None:
+        for face in self.faces:
+            face.begin(*((None, 0.0) if old is None else (old.x[: self._n], old.control)))
+
+    def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
+        if self.faces:
+            values, fields, constrained = F.array_r[: self._n].copy(), x.array_r[: self._n], self._problem.constrained
+            for face in self.faces:
+                face.linearise(values, fields, control)
+            values[constrained] = F.array_r[: self._n][constrained]
+            F.array_w[: self._n] = values
+
+    def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[np.ndarray]:
+        return [face.one_sided_change(x.array_r[: self._n], control) for face in self.faces]
+
+    def unit_forces(self, chosen: list[np.ndarray]) -> np.ndarray:
+        comm, components = self._problem.comm, self.faces[0].points.shape[1]
+        counts = listed(comm, [len(points) * components for points in chosen])
+        E, end = np.zeros((self._problem.x.getLocalSize(), sum(map(sum, counts)))), 0
+        for rank, of_faces in enumerate(counts):
+            for face, points, count in zip(self.faces, chosen, of_faces):
+                first, end = end, end + count
+                face.rule.add_unit_forces(E[:, first:end], points if rank == comm.rank else None)
+        E[self._problem.constrained] = 0
+        return E
+
+    def activate(self, number: int, x: np.ndarray, control: float) -> None:
+        for face in self._problem.contacts:
+            if face.contact in self._problem.scene.items[number: number + 1]:       # a law of heat has no item
+                face.activate(x, control)
+                depth = penetration(face, x, control)
+                if depth > 1e-6 * self._problem.forms.length:
+                    raise InputError(f"{face.contact!r} takes part again where the body is, which reaches"
+                                     f" {depth:.6g} into the tool")
+
+
+class ProblemHistories:
+    """History variables and process time of a problem.
+
+    Args:
+        problem: the `Problem`.
+
+    Attributes:
+        parts: histories on which F depends (`History`): contacts, then materials, then the temperature.
+        materials: history of each material with internal variables or past states (`ConstitutiveHistory`).
+        path_dependent: True if F depends on earlier states.
+        body_path_dependent: True if materials or the temperature have history variables.
+        rate_dependent: True if the body depends on process time, through a material or through its temperature.
+    """
+
+    def __init__(self, problem: Problem):
+        self._problem, self._forms = problem, problem.forms
+        of_body = self._forms.histories
+        self.parts: list[History] = [*(c for c in problem.contacts if c.has_history), *of_body]
+        self.materials = [history for history in of_body if isinstance(history, ConstitutiveHistory)]
+        self.path_dependent, self.body_path_dependent = bool(self.parts), bool(of_body)
+        self.rate_dependent = len(self.materials) < len(of_body) or any(m.rate_dependent for m in self.materials)
+        self._predicted: tuple[Any, list[Any]] = None, []   # x, and the history variables of the forms at x
+
+    @property
+    def variables(self) -> list[Any]:
+        """History variables of the last accepted state: the result of `History.get` for each of `parts`."""
+        return [history.get() for history in self.parts]
+
+    @variables.setter
+    def variables(self, variables: list[Any]) -> None:
+        self._predicted = None, []
+        for history, stored in zip(self.parts, variables, strict=True):
+            history.put(stored)
+
+    def stored(self) -> tuple[list[Any], tuple[Any, list[Any]]]:
+        """Return the current history variables and predicted ones for `put_back`."""
+        return self.variables, self._predicted
+
+    def put_back(self, stored: tuple[list[Any], tuple[Any, list[Any]]]) -> None:
+        """Restore what `stored` returned."""
+        self.variables, self._predicted = stored
+
+    @property
+    def clock(self) -> float:
+        """Process time at control 0; a run that chooses its own time steps sets it before each step."""
+        return self._forms.clock
+
+    @clock.setter
+    def clock(self, time: float) -> None:
+        self._forms.clock = time
+
+    def time_at(self, control: float) -> float:
+        return self._forms.time_at(control)
+
+    def advance(self, x: np.ndarray, control: float) -> None:
+        if self.body_path_dependent:
+            self._problem.set_fields(x, control)
+        known = self._predicted[1] if self._predicted[0] is x else []
+        for history in self.parts[: len(self.parts) - len(known)]:
+            history.advance(x[: self._problem.n_owned], control)
+        for history, variables in zip(self._forms.histories, known):
+            history.put(variables)
+        self._predicted = None, []
+
+    def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
+        """Return the history variables of materials and temperature at the end of a step that is not yet accepted.
+
+        They are stored, and `advance` uses them if it accepts the same x, shape (n,). The caller must restore the
+        earlier ones.
+        """
+        self._problem.set_fields(x, control)
+        for history in self._forms.histories:
+            history.advance(x[: self._problem.n_owned], control, start)
+        after = [history.get() for history in self._forms.histories]
+        self._predicted = x, after
+        return after
+
+    @cached_property
+    def _step_error(self) -> StepError:
+        return StepError(self._problem)
+
+    def step_error(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
+        return self._step_error.estimate(past, share, x, control)
+
+
+class UnloadedBody:
+    """Body in the reference configuration; `singular` is True if it has no stiffness in some direction there."""
+
+    def __init__(self, problem: Problem):
+        self._problem, self.singular = problem, problem.forms.singular_unloaded
+
+    def stiff_state(self, out: PETSc.Vec) -> None:
+        forms = self._problem.forms
+        forms.set_stiff()
+        self._problem.fill(out, forms.w.x.array[: self._problem.n_owned])
+
+    def motion(self, control: float) -> np.ndarray:
+        values = np.zeros(self._problem.x.getLocalSize())
+        values[self._problem.constrained] = self._problem.constrained_values(control)
+        return values
+
+
+class SceneDescription:
+    """Names, units and explanations of the numbers of a problem.
+
+    Args:
+        problem: the `Problem`.
+
+    Attributes:
+        scales: value in the user's units over dimensionless amplitude of each item; at the end 1.0 for process time.
+        units: units of the dimensionless energy of the whole part (stress length^3) and of length, in the user's units.
+        fixed_loads: loads that act already at control 0, as text.
+    """
+
+    def __init__(self, problem: Problem):
+        scene, forms = problem.scene, problem.forms
+        self._problem, self._scene = problem, scene
+        self.scales: Sequence[float] = forms.scales
+        self.units: tuple[float, float] = (scene.symmetry_factor * forms.stress * forms.volume, forms.length)
+        self.fixed_loads: Sequence[str] = [repr(load) for load in scene.loads if not load.driven]
+
+    main_columns: Sequence[str] = cached_property(lambda self: [  # type: ignore[assignment]
+        "process_time", *map(self._scene.column, self._scene.drivable), "pole_height", "pole_stretch"])
+
+    @property
+    def control_kind(self) -> str | None:
+        number, items = self._problem.setting.controlled, self._scene.items
+        return None if number is None else "time" if number == len(items) else items[number].quantity
+
+    def shown(self, control: float) -> tuple[str, float]:
+        setting, items = self._problem.setting, self._scene.items
+        number = setting.controlled
+        if number is None:
+            return "control", control
+        name = "process time" if number == len(items) else self._scene.column(items[number]).replace("_", " ")
+        return name, self.scales[number] * setting.amplitude(number, control)
+
+    def implausible(self, control: float) -> str | None:
+        return implausible(self._scene, self.control_kind, self.shown(control)[1])
+
+    @property
+    def why_not_finite(self) -> str:
+        limits = {f"{m} was stretched beyond its limit, I1 < {m.largest_I1:.6g}": None
+                  for m in self._scene.materials.values() if m.largest_I1 < np.inf}
+        strained = limits or ["a material was strained beyond what its law allows"]
+        return ", or ".join(["an element turned inside out", *strained])
+
+    def examine(self, last: Any, attempt: Any) -> Examination:
+        return Examination(self._problem, last, attempt)

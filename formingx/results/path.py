@@ -276,7 +276,7 @@ class Path:
         a ConvergenceError.
         """
         try:
-            if segment.problem.has_history:                  # states between them depend on the history
+            if segment.problem.history.path_dependent:                  # states between them depend on the history
                 found = self._run_to(segment, left, right, target, bound)
             else:
                 found = segment.curve.state_at_value(left, right, bound, target.value)

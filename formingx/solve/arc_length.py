@@ -37,7 +37,7 @@ class Curve:
     .. math:: \Delta s^2 = \overline{|\Delta x|^2} + w \, \Delta\lambda^2,
 
     with the weight w of the control. The first term is the mean over the body of the squared displacement, made
-    dimensionless by the size of the body (`Residual.inner`).
+    dimensionless by the size of the body (`Equations.inner`).
 
     Args:
         problem: the equations.
@@ -96,7 +96,7 @@ class Curve:
                 raise
             self._iterations += len(history) - 1
         else:
-            self.problem.stiff_state(self._x)
+            self.problem.reference.stiff_state(self._x)
             if not self.newton.tangent(self._x, 0.0):
                 raise ConvergenceError("the unloaded body has a singular tangent: something in it is not held, or has"
                                        " no stiffness")
@@ -123,7 +123,7 @@ class Curve:
         self.problem.residual(self._x, control, self.newton.F)
         flat = self._has_no_stiffness()
         if flat:                                            # such as a flat membrane between equal pressures
-            self.problem.stiff_state(self._x)
+            self.problem.reference.stiff_state(self._x)
         if not self.newton.tangent(self._x, control):
             raise Failure("the tangent is singular: something in the body is held no more, or has no stiffness", [])
         if flat:
@@ -168,8 +168,10 @@ class Curve:
         ones, and so do contact events, for the same events after a checkpoint.
         """
         self._x.array_w[:] = state.x
-        limit, at_hand = self.problem.limit, state is self._found and not self.problem.body_has_history
-        at_hand, self._found = at_hand and not (limit and limit.predicts_events), None
+        limit = self.problem.contact.limit
+        at_hand = state is self._found and not (self.problem.history.body_path_dependent
+                                                or limit and limit.predicts_events)
+        self._found = None
         count = self.newton.solver.count
         if at_hand and self.newton.update_one_sided(self._x, state.control) or self.newton.tangent(
                 self._x, state.control, one_sided=True):
@@ -250,8 +252,8 @@ class Curve:
         The guess has the prescribed displacements at this control, and 0 elsewhere. If the unloaded body has no
         stiffness, such as a flat membrane, the guess is a multiple of the first tangent t instead, with F . t = 0.
         """
-        if not self.problem.singular_unloaded or control == 0:
-            return self.problem.motion(control)
+        if not self.problem.reference.singular or control == 0:
+            return self.problem.reference.motion(control)
         sign, low, high = np.sign(control), 0.0, 1e-6
 
         def work(length: float) -> float:
@@ -413,7 +415,7 @@ class Curve:
         b = self.newton.b
         size = self._length_of(b)
         state = State(self._x.array_r.copy(), control, b.array_r / size, 1 / size, history=history, kind=kind,
-                      time=self.problem.time_at(control))
+                      time=self.problem.history.time_at(control))
         if before is not None and self._inner(state.direction, state.slope, state.x - before.x,
                                               control - before.control) < 0:
             state.direction, state.slope = -state.direction, -state.slope
@@ -424,7 +426,7 @@ class Curve:
 
     def _has_no_stiffness(self) -> bool:
         """Return True if the unknowns `_x` are those of a flat membrane, which has no stiffness normal to itself."""
-        return self.problem.singular_unloaded and self.norm(self._x, 0.0) < _FLAT
+        return self.problem.reference.singular and self.norm(self._x, 0.0) < _FLAT
 
     def _length_of(self, b: PETSc.Vec) -> float:
         """Return the arc length per unit of the control along a tangent b = dx/dcontrol."""

@@ -55,7 +55,7 @@ class OrientationCheck:
 
     def check(self, old: State, new: State) -> None:
         """Raise `ReversedOrientation` if the step from `old` to `new` should be repeated with another length."""
-        smooth = old.kind in ("step", "target") or old.kind == "start" and not self._curve.problem.singular_unloaded
+        smooth = old.kind in ("step", "target") or old.kind == "start" and not self._curve.problem.reference.singular
         if self._accepts or not smooth or not self._lengths and self._curve.distance(old, new) < 2 * self._shortest:
             return
         self._accepts = self._end is not None and self._distance(old, new, self._end) < self.max_distance
@@ -102,12 +102,12 @@ def branches(curve: Curve, states: Sequence[State], sign: Callable[[State], int]
     """
     if _follow_from_states(curve, states):
         return _orientation_changes(curve, states)
-    return _sign_changes(states[1 if curve.problem.singular_unloaded else 0:], sign)
+    return _sign_changes(states[1 if curve.problem.reference.singular else 0:], sign)
 
 
 def _follow_from_states(curve: Curve, states: Sequence[State]) -> bool:
     """Return True if branch points need no dF/dx, by orientations or since history variables exclude them."""
-    return curve.problem.has_history or any(state.orientation for state in states)
+    return curve.problem.history.path_dependent or any(state.orientation for state in states)
 
 
 def warn_of_branches(record: Any, step: Sequence[State]) -> None:
@@ -124,7 +124,7 @@ def _orientation_changes(curve: Curve, states: Sequence[State]) -> list[tuple[St
     """
     found: list[tuple[State, State]] = []
     last: State | None = None
-    for state in [] if curve.problem.has_history else states:
+    for state in [] if curve.problem.history.path_dependent else states:
         if state.kind == "limit point":
             continue
         first = state.kind in ("start", "jump") or last is not None and last.setting != state.setting
@@ -132,7 +132,7 @@ def _orientation_changes(curve: Curve, states: Sequence[State]) -> list[tuple[St
             sense = -1 if curve.progress(last, state) < 0 else 1
             if sense * last.orientation * state.orientation < 0:
                 found.append((last, state))
-        smooth = state.kind in ("step", "target") or state.kind == "start" and not curve.problem.singular_unloaded
+        smooth = state.kind in ("step", "target") or state.kind == "start" and not curve.problem.reference.singular
         last = state if smooth else None
     return found
 

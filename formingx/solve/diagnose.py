@@ -188,13 +188,13 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
     """
     equations, last = curve.problem, states[-1] if states else None
     facts: dict[str, Any] = {"reason": reason, "step": len(states),
-                             "control": equations.shown(last.control)[1] if last else 0.0,
-                             "what": equations.shown(0.0)[0]}
-    examined = equations.examine(last, attempt)
+                             "control": equations.description.shown(last.control)[1] if last else 0.0,
+                             "what": equations.description.shown(0.0)[0]}
+    examined = equations.description.examine(last, attempt)
     if examined is not None:
         facts |= examined.facts
     if attempt is not None:
-        facts["aimed"] = equations.shown(attempt.control)[1]
+        facts["aimed"] = equations.description.shown(attempt.control)[1]
     if last:
         facts |= _tangent_facts(curve, states)
     found = findings_at("failure", FailedRun(facts, equations, last, curve.fixed_control, target))
@@ -205,7 +205,7 @@ def diagnose(curve: Curve, states: Sequence[State], reason: str, attempt: Attemp
 
 def limits_passed(problem: Equations, states: Sequence[State]) -> str:
     """Return a sentence with the values at the limit points of a path, after a space; "" without limit points."""
-    shown = [problem.shown(state.control) for state in states if state.kind == "limit point"]
+    shown = [problem.description.shown(state.control) for state in states if state.kind == "limit point"]
     if not shown:
         return ""
     many = f"{len(shown)} limit points were" if shown[1:] else "A limit point was"
@@ -235,16 +235,19 @@ def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
     """
     problem = curve.problem
     solver = DirectSolver(problem.matrix, problem.symmetric, determinant=True)
+
+    def value(control: float) -> float:
+        return problem.description.shown(control)[1]
     sign = determinant_sign(curve, solver)
-    limits = tuple(problem.shown(s.control)[1] for s in states if s.kind == "limit point")
+    limits = tuple(value(s.control) for s in states if s.kind == "limit point")
     facts: dict[str, Any] = {"limit_points": limits}
-    usable = [s for s in states[1 if problem.singular_unloaded else 0:] if s.kind != "limit point"]
+    usable = [s for s in states[1 if problem.reference.singular else 0:] if s.kind != "limit point"]
     if sign(states[-1]):
         facts["condition"] = condition(problem.matrix, solver)
     if len(usable) > _LIMITS.states_before and sign(usable[-1 - _LIMITS.states_before]):
         facts["condition_before"] = condition(problem.matrix, solver)
     turned = branches(curve, states, sign)
-    facts["turned"] = tuple((problem.shown(a.control)[1], problem.shown(b.control)[1]) for a, b in turned)
+    facts["turned"] = tuple((value(a.control), value(b.control)) for a, b in turned)
     solver.destroy()
     if len(states) > 2:
         a, b = states[-2:]
@@ -252,7 +255,7 @@ def _tangent_facts(curve: Curve, states: Sequence[State]) -> dict[str, Any]:
         drop = slopes[-2]**2 - slopes[-1]**2              # slope^2 is proportional to the distance to the limit
         if drop > 0 and slopes[-2] * slopes[-1] > 0 and abs(slopes[-1]) < _LIMITS.slope_ratio * max(map(abs, slopes)):
             ahead = b.control + (b.control - a.control) * slopes[-1]**2 / drop
-            facts["next_limit_point"] = problem.shown(ahead)[1]
+            facts["next_limit_point"] = value(ahead)
     return facts
 
 

@@ -4,13 +4,13 @@ In all members x is the vector of unknowns, and the control a number; both are d
 distributed over the ranks; an array holds the locally owned entries, shape (n,). `out` is a vector that receives the
 result. In each step the solver calls these methods, in this order:
 
-    limit.length, limit.prepare         Limit the step length. Prepare the contacts for the step.
-    begin                               Start Newton's method at the predicted state.
+    contact.limit.length, prepare       Limit the step length. Prepare the contacts for the step.
+    contact.begin                       Start Newton's method at the predicted state.
     residual                            Compute F. This and the next two lines are called in each iteration.
-    linearise                           Compute F and its active set for the linearisation.
+    contact.linearise                   Compute F and its active set for the linearisation.
     tangent, control_derivative         Compute dF/dx and dF/dcontrol, at the (x, control) of the residual.
-    has_inverted_element, limit.check, step_error   Check the converged state.
-    advance                             Accept the state and update the history variables.
+    has_inverted_element                Check the converged state, as contact.limit.check and history.step_error do.
+    history.advance                     Accept the state and update the history variables.
     tangent(one_sided=True)             Compute the tangent of the next step, which differs if F has a kink.
 
 `state_context` and `restore` return to an earlier state. `enter` changes the step data between the stages of a process.
@@ -32,7 +32,6 @@ from petsc4py import PETSc
 
 from ..contact.face import FaceContact
 from ..contact.step_limit import StepLimit
-from ..forms.history import ConstitutiveHistory
 from ..forms.schedule import StepData
 from ..forms.viscosity import Viscosity as Viscosity
 from ..measures.quantities import Quantity as Quantity
@@ -92,8 +91,169 @@ class Examined(Protocol):
         """Draw the last good state with a title, on rank 0; raise `InputError` if there is nothing to draw."""
 
 
-class Residual(Protocol):
-    """Residual F(x, control) and its derivatives.
+class ReferenceConfiguration(Protocol):
+    """The body in the reference configuration, x = 0, from which a path begins.
+
+    Attributes:
+        singular: True if dF/dx is singular there.
+    """
+
+    singular: bool = False
+
+    def stiff_state(self, out: PETSc.Vec) -> None:
+        """Compute in `out` unknowns near x = 0 with a regular dF/dx, from which the first tangent of a path follows."""
+        return
+
+    def motion(self, control: float) -> Array:
+        """Return a first guess of x: the prescribed displacements at a control, else 0; locally owned, shape (n,)."""
+        return np.zeros(1)
+
+
+class ActiveSet(Protocol):
+    """Contact of the body: the residual F has a kink where points close, open, begin to stick or begin to slide."""
+
+    @property
+    def faces(self) -> Sequence[FaceContact]:
+        """Faces in contact that are active in the current stage. Without them F is smooth."""
+        return []
+
+    @property
+    def limit(self) -> StepLimit | None:
+        """Limits that contact sets to a step; None without limits."""
+        return None
+
+    @property
+    def status(self) -> Hashable:
+        """Contact status of all points at the residual last computed, the same on all ranks; None without contact."""
+        return None
+
+    def begin(self, old: ProblemState | None = None) -> None:
+        """Start the increments of all contacts for a run of Newton's method, from the last accepted state or None."""
+        return
+
+    def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
+        """Linearise the contact law for an iteration at (x, control); its forces replace those in the residual F."""
+        return
+
+    def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[Array]:
+        """Return for each face the change of the contact stiffness for the next step from an accepted state.
+
+        At a kink of F the stiffness there differs from that in the last tangent, which is subtracted. Shape (n, c, c),
+        stress/length, for n points with c components.
+        """
+        return []
+
+    def unit_forces(self, chosen: list[Array]) -> Array:
+        """Return the residuals of unit forces at chosen owned points of each face, shape (n, m), 0 at constraints.
+
+        The m columns are ordered by rank, face, point and component.
+        """
+        return np.zeros((0, 0))
+
+    def activate(self, number: int, x: Array, control: float) -> None:
+        """Activate the contact that is item `number` of `Scene.items`; its history variables start at (x, control).
+
+        Raise `InputError` if its tool would be inside the body.
+        """
+        return
+
+
+class Histories(Protocol):
+    """History variables and process time, on which F may depend besides x and the control.
+
+    Attributes:
+        variables: history variables after the last accepted state, an entry for each history of the problem (contacts,
+            materials, temperature).
+        clock: process time at control 0.
+        path_dependent: True if the residual F depends on earlier states, by a material, the temperature or friction.
+        body_path_dependent: True if it depends on them by a material or the temperature, not only by contact.
+        rate_dependent: True if F depends on process time, not only on the control.
+    """
+
+    variables: list[Any]
+    clock: float
+    path_dependent: bool = False
+    body_path_dependent: bool = False
+    rate_dependent: bool = False
+
+    def advance(self, x: Array, control: float) -> None:
+        """Update the history variables to the accepted state (x, control); x: locally owned entries, shape (n,)."""
+        return
+
+    def time_at(self, control: float) -> float:
+        """Return the process time at a value of the control."""
+        return self.clock
+
+    def step_error(self, past: Sequence[ProblemState], share: Array, x: Array,
+                   control: float) -> tuple[float, float]:
+        """Estimate the time integration error of a step from the last of `past` to x, shape (n,).
+
+        share: weights of `past` and of x that interpolate the unknowns halfway in time, shape (k + 1,). Return the
+        relative error of the stress, and the part that remains if the body then relaxes at constant deformation for
+        another duration of the step.
+        """
+        return 0.0, 0.0
+
+
+class Description(Protocol):
+    """Names, units and explanations of the numbers of a problem, for messages and results.
+
+    Attributes:
+        scales: value in the user's units over dimensionless amplitude of each item; at the end 1.0 for process time.
+        units: unit of the dimensionless energy and unit of the dimensionless length, in the user's units.
+        fixed_loads: loads that act already at control 0, as text.
+        main_columns: names of the output quantities that `Record.describe` states.
+    """
+
+    scales: Sequence[float] = ()
+    units: tuple[float, float] = (1.0, 1.0)
+    fixed_loads: Sequence[str] = ()
+    main_columns: Sequence[str] = ()
+
+    @property
+    def control_kind(self) -> str | None:
+        """Kind of the controlled quantity: "pressure", "travel", "time" or, if it is none of them, None."""
+        return None
+
+    def shown(self, control: float) -> tuple[str, float]:
+        """Return (name of the controlled quantity, its value in the user's units) at a value of the control."""
+        return "control", control
+
+    def implausible(self, control: float) -> str | None:
+        """Return the reason, as text, for which no process reaches this value of the control; None if it may."""
+        return None
+
+    @property
+    def why_not_finite(self) -> str:
+        """Reason, as text, for which the residual last computed is infinite or not a number."""
+        return "the equations are not defined there"
+
+    def examine(self, last: ProblemState | None, attempt: Attempt | None) -> Examined | None:
+        """Examine the body in the last good state and a failed attempt; None without a body; collective."""
+        return None
+
+
+class NoContact(ActiveSet):
+    """Equations without contact."""
+
+
+class NoHistories(Histories):
+    """Equations without history variables, at process time 0."""
+
+    def __init__(self) -> None:
+        self.variables, self.clock = [], 0.0
+
+
+class NoDescription(Description):
+    """Equations without names and units."""
+
+
+class RegularReference(ReferenceConfiguration):
+    """Reference configuration with a regular dF/dx."""
+
+
+class Equations(Protocol):
+    """Interface of a problem F(x, control) = 0 for the solver: the residual F, its derivatives and its parts.
 
     Attributes:
         comm: MPI communicator.
@@ -106,6 +266,26 @@ class Residual(Protocol):
     x: PETSc.Vec
     matrix: PETSc.Mat
     force_scale: float
+
+    @property
+    def reference(self) -> ReferenceConfiguration:
+        """The body in the reference configuration."""
+        return RegularReference()
+
+    @property
+    def contact(self) -> ActiveSet:
+        """Contact of the body."""
+        return NoContact()
+
+    @property
+    def history(self) -> Histories:
+        """History variables and process time."""
+        return NoHistories()
+
+    @property
+    def description(self) -> Description:
+        """Names and units, for messages."""
+        return NoDescription()
 
     @property
     def symmetric(self) -> bool:
@@ -141,115 +321,6 @@ class Residual(Protocol):
         """Return the viscosity of the body for a snap-through; the caller calls its `destroy`."""
 
     @property
-    def singular_unloaded(self) -> bool:
-        """True if dF/dx is singular in the reference configuration, x = 0."""
-        return False
-
-    def stiff_state(self, out: PETSc.Vec) -> None:
-        """Compute in `out` unknowns near x = 0 with a regular dF/dx, from which the first tangent of a path follows."""
-
-    def motion(self, control: float) -> Array:
-        """Return a first guess of x: the prescribed displacements at a control, else 0; locally owned, shape (n,)."""
-        return np.zeros(self.x.getLocalSize())
-
-
-class ActiveSet(Protocol):
-    """Contact of the body: the residual F has a kink where points close, open, begin to stick or begin to slide."""
-
-    @property
-    def has_kinks(self) -> bool:
-        """True if F may have kinks, at which its one-sided derivatives differ."""
-        return False
-
-    @property
-    def active_contacts(self) -> Sequence[FaceContact]:
-        """Faces in contact that are active in the current stage."""
-        return []
-
-    @property
-    def active_set(self) -> Hashable:
-        """Contact status of all points at the residual last computed, the same on all ranks; None without contact."""
-        return None
-
-    @property
-    def constrained(self) -> Array:
-        """Local numbers of the locally owned unknowns that are constrained."""
-        return np.zeros(0, dtype=np.int32)
-
-    @property
-    def limit(self) -> StepLimit | None:
-        """Limits that contact sets to a step; None without limits."""
-        return None
-
-    def begin(self, old: ProblemState | None = None) -> None:
-        """Start the increments of all contacts for a run of Newton's method, from the last accepted state or None."""
-
-    def linearise(self, x: PETSc.Vec, control: float, F: PETSc.Vec) -> None:
-        """Linearise the contact law for an iteration at (x, control); its forces replace those in the residual F."""
-
-    def one_sided_changes(self, x: PETSc.Vec, control: float) -> list[Array]:
-        """Return for each face the change of the contact stiffness for the next step from an accepted state.
-
-        At a kink of F the stiffness there differs from that in the last tangent, which is subtracted. Shape (n, c, c),
-        stress/length, for n points with c components.
-        """
-        return []
-
-
-class Histories(Protocol):
-    """History variables and process time, on which F may depend besides x and the control.
-
-    Attributes:
-        history_variables: history variables after the last accepted state, an entry for each history of the problem
-            (contacts, materials, temperature).
-        clock: process time at control 0.
-    """
-
-    history_variables: list[Any]
-    clock: float
-
-    @property
-    def has_history(self) -> bool:
-        """True if the residual F depends on earlier states, by a material, the temperature or friction."""
-        return False
-
-    @property
-    def materials(self) -> Sequence[ConstitutiveHistory]:
-        """Constitutive histories of the materials of the body."""
-        return []
-
-    @property
-    def body_has_history(self) -> bool:
-        """True if F depends on earlier states by a material or the temperature, not only by contact."""
-        return False
-
-    @property
-    def relaxes(self) -> bool:
-        """True if F depends on process time, not only on the control."""
-        return False
-
-    def advance(self, x: Array, control: float) -> None:
-        """Update the history variables to the accepted state (x, control); x: locally owned entries, shape (n,)."""
-
-    def time_at(self, control: float) -> float:
-        """Return the process time at a value of the control."""
-        return self.clock
-
-    def step_error(self, past: Sequence[ProblemState], share: Array, x: Array,
-                   control: float) -> tuple[float, float]:
-        """Estimate the time integration error of a step from the last of `past` to x, shape (n,).
-
-        share: weights of `past` and of x that interpolate the unknowns halfway in time, shape (k + 1,). Return the
-        relative error of the stress, and the part that remains if the body then relaxes at constant deformation for
-        another duration of the step.
-        """
-        return 0.0, 0.0
-
-
-class Stages(Protocol):
-    """Step data of the problem, which change between the stages of a process."""
-
-    @property
     def setting(self) -> StepData:
         """Current step data: amplitudes as functions of the control, and inactive items."""
 
@@ -265,58 +336,3 @@ class Stages(Protocol):
 
     def state_context(self, state: ProblemState) -> AbstractContextManager[Equations]:
         """Return a context in which the problem has the unknowns, step data and history variables of a state."""
-
-    def activate(self, number: int, x: Array, control: float) -> None:
-        """Activate item `number` of `Scene.items` at (x, control); a contact begins with new history variables.
-
-        Raise `InputError` if a tool would be activated inside the body.
-        """
-
-
-class ProblemUnits(Protocol):
-    """Units and names of the dimensionless numbers of a problem, in messages and results."""
-
-    @property
-    def scales(self) -> Sequence[float]:
-        """Value in the user's units over dimensionless amplitude of each item; at the end 1.0 for process time."""
-
-    @property
-    def units(self) -> tuple[float, float]:
-        """Unit of the dimensionless energy and unit of the dimensionless length, in the user's units."""
-        return 1.0, 1.0
-
-    @property
-    def control_kind(self) -> str | None:
-        """Kind of the controlled quantity: "pressure", "travel", "time" or, if it is none of them, None."""
-        return None
-
-    @property
-    def fixed_loads(self) -> list[str]:
-        """Loads that act already at control 0, as text."""
-        return []
-
-    @property
-    def main_columns(self) -> Sequence[str]:
-        """Names of the output quantities that `Record.describe` states."""
-        return []
-
-    def shown(self, control: float) -> tuple[str, float]:
-        """Return (name of the controlled quantity, its value in the user's units) at a value of the control."""
-        return "control", control
-
-    def implausible(self, control: float) -> str | None:
-        """Return the reason, as text, for which no process reaches this value of the control; None if it may."""
-        return None
-
-    @property
-    def why_not_finite(self) -> str:
-        """Reason, as text, for which the residual last computed is infinite or not a number."""
-        return "the equations are not defined there"
-
-    def examine(self, last: ProblemState | None, attempt: Attempt | None) -> Examined | None:
-        """Examine the body in the last good state and a failed attempt; None without a body; collective."""
-        return None
-
-
-class Equations(Residual, ActiveSet, Histories, Stages, ProblemUnits, Protocol):
-    """Interface of a problem F(x, control) = 0 for the solver."""

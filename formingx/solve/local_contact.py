@@ -14,7 +14,7 @@ stiffnesses.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -22,7 +22,6 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..contact.face import FaceContact
 from ..ranks import combined, gathered, listed
 from .equations import Array, Equations
 from .linear import CONDENSATION, DirectSolver
@@ -209,7 +208,7 @@ class LocalSolve:
     """
 
     def __init__(self, problem: Equations):
-        self._problem, self._contacts = problem, problem.active_contacts
+        self._problem, self._contacts = problem, problem.contact.faces
         self._marked: list[Array] = []
         self._status: list[Array] = []
         self.failed = 0
@@ -236,7 +235,7 @@ class LocalSolve:
             points = combined(self._problem.comm, sum(map(len, chosen)), MPI.SUM)
             if not 0 < points <= _LOCAL.max_points:
                 return step
-            small = _Points(self._problem, self._contacts, chosen, solver, border)
+            small = _Points(self._problem, chosen, solver, border)
             change = small.solve(dx, step)
             if change is None:
                 self.failed += 1
@@ -279,25 +278,9 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
         return None
     if not points:
         return lambda V, step: V
-    small = _Points(problem, problem.active_contacts, chosen, solver, lambda V: np.zeros(V.shape[1]))
+    small = _Points(problem, chosen, solver, lambda V: np.zeros(V.shape[1]))
     stiffer = [change[i] for change, i in zip(changes, chosen)]
     return lambda V, step: small.updated(V, step, stiffer)
-
-
-def unit_forces(problem: Equations, contacts: Sequence[FaceContact], chosen: list[Array]) -> Array:
-    """Return the residuals of unit forces at chosen owned points of each face, shape (n, m), 0 at constrained unknowns.
-
-    The m columns are ordered by rank, face, point and component.
-    """
-    comm, components = problem.comm, contacts[0].points.shape[1]
-    counts = listed(comm, [len(points) * components for points in chosen])
-    E, end = np.zeros((problem.x.getLocalSize(), sum(map(sum, counts)))), 0
-    for rank, of_faces in enumerate(counts):
-        for contact, points, count in zip(contacts, chosen, of_faces):
-            first, end = end, end + count
-            contact.rule.add_unit_forces(E[:, first:end], points if rank == comm.rank else None)
-    E[problem.constrained] = 0
-    return E
 
 
 class _Points:
@@ -308,15 +291,14 @@ class _Points:
 
     Args:
         problem: the equations.
-        contacts: the faces in contact.
         chosen: for each face, local numbers of owned points.
         solver: solver with the LU factors of the tangent K.
         border: function that maps solutions K^-1 E, shape (n, m), to the bordered system in place. It returns the
             changes of the control, shape (m,).
     """
 
-    def __init__(self, problem: Equations, contacts: Sequence[FaceContact], chosen: list[Array],
-                 solver: DirectSolver, border: Border):
+    def __init__(self, problem: Equations, chosen: list[Array], solver: DirectSolver, border: Border):
+        contacts = problem.contact.faces
         self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
         self._c = contacts[0].points.shape[1]               # number of components
         self._some = [(c, i) for c, i in zip(contacts, chosen) if len(i)]
@@ -325,7 +307,7 @@ class _Points:
         self._own = slice(first, first + counts[self._comm.rank])
         ends = np.cumsum([0, *map(len, chosen)])
         self._parts = [slice(a, b) for a, b in zip(ends, ends[1:]) if b > a]    # of the owned points of each contact
-        self._columns = columns(solver, unit_forces(problem, contacts, chosen), border)
+        self._columns = columns(solver, problem.contact.unit_forces(chosen), border)
         scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
         self._scale = self._gather(scale)
         self._C = self._gather(self._columns.motions(self._moved)) * self._scale

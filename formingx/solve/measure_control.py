@@ -73,7 +73,7 @@ class QuantityRun(Run):
 
     def _accept(self, state: State) -> None:
         """Accept a state, and set the process time of the problem to the time of the state."""
-        self.problem.clock = state.time
+        self.problem.history.clock = state.time
         super()._accept(state)
 
     def _next_states(self, old: State) -> list[State]:
@@ -109,10 +109,10 @@ class QuantityRun(Run):
 
     def _solve_at(self, old: State, time: float) -> State:
         """Return the state at a process time, one step after the accepted state `old`, or raise `Failure`."""
-        problem, problem.clock = self.problem, time
+        problem, problem.history.clock = self.problem, time
         value = float(self._amplitude(time))
         x, control = self._predicted(old, time, value)
-        trial, limit = TrialStep(old.x, old.control, x - old.x, control - old.control, 1.0), problem.limit
+        trial, limit = TrialStep(old.x, old.control, x - old.x, control - old.control, 1.0), problem.contact.limit
         if limit and limit.length(trial) < _STEPS.min_contact_fraction:
             raise Failure("too many points would come into contact in one step", [])
         if limit:
@@ -133,7 +133,7 @@ class QuantityRun(Run):
         length = self.curve.distance(old, new)
         if length < _STEPS.min_control_change:
             return new
-        if self.problem.relaxes:
+        if self.problem.history.rate_dependent:
             before = _rate([*predictor.recent_states(self.states[:-1], old.time, 2), old])
             after, step = _rate([*predictor.recent_states(self.states, new.time, 2), new]), new.time - old.time
         else:                                                # the tangents of the path show an extremum
@@ -160,7 +160,7 @@ class QuantityRun(Run):
         With a single state it is the point on its tangent at which the quantity has the prescribed `value` (user's
         units).
         """
-        past = predictor.recent_states(self.states, time, predictor.CUBIC - self.problem.has_kinks)
+        past = predictor.recent_states(self.states, time, predictor.CUBIC - bool(self.problem.contact.faces))
         if len(past) == 1:
             return self._on_tangent(old, value)
         w = predictor.weights(past, time)
@@ -193,7 +193,7 @@ class QuantityRun(Run):
                 continue
             values = []
             for state in (old, new):
-                problem.clock = state.time
+                problem.history.clock = state.time
                 values.append(self.curve.value(quantity, state.x, state.control) - target.value)
             if values[0] * values[1] < 0:
                 found = self._state_at_target(old, target, quantity, old.time, new.time)

@@ -12,7 +12,7 @@ from petsc4py import PETSc
 
 from ..errors import count, positive
 from ..forms.schedule import StepData
-from .equations import Array, Attempt, Constraint, Equations, ProblemState, Residual
+from .equations import Array, Attempt, Constraint, Equations, ProblemState
 from .linear import DirectSolver
 from .local_contact import BorderedTangent, LocalSolve, Update, woodbury
 
@@ -84,14 +84,14 @@ class ActiveSetChanges:
         moved: size of the last correction, which decides whether a new active set counts in `found`.
         """
         self._iteration += 1
-        now = self._problem.active_set
+        now = self._problem.contact.status
         if now != self._last and self._last is not None:
             self.changed = self._iteration
             if now in self._seen:
                 self.share = max(self.share / 2, 0.25)
                 self.returns += 1
             else:
-                self.found += moved < self._small and not self._problem.has_history
+                self.found += moved < self._small and not self._problem.history.path_dependent
         elif self._iteration > self.changed + 1:
             self.share = 1.0
         self._seen[now] = self._iteration
@@ -139,7 +139,7 @@ class ModifiedNewton:
         self._fall, self._first = fall, False
 
 
-def relative(equations: Residual, forces: float, floor: float = Newton.force_floor) -> float:
+def relative(equations: Equations, forces: float, floor: float = Newton.force_floor) -> float:
     """Return the relative norm of unbalanced forces, |F| / (|support forces| + floor), dimensionless."""
     return float(forces / (equations.force_scale + floor))
 
@@ -302,7 +302,7 @@ class BorderedNewton:
 
         Their number is `Newton.history_settling`.
         """
-        self._limited = limited and self.problem.has_history
+        self._limited = limited and self.problem.history.path_dependent
         try:
             yield
         finally:
@@ -340,7 +340,7 @@ class BorderedNewton:
         It adds the changed stiffness of a few contact points. Return False, `b` unchanged, if they are too many or
         dF/dx is singular.
         """
-        update = woodbury(self.problem, self.problem.one_sided_changes(x, control), self.solver)
+        update = woodbury(self.problem, self.problem.contact.one_sided_changes(x, control), self.solver)
         found = update and update(self.b.array_r[:, None], 1.0)
         if found is None:
             return False
@@ -362,25 +362,25 @@ class BorderedNewton:
         """
         problem = self.problem
         history: list[Iteration] = []
-        problem.begin(old)
+        problem.contact.begin(old)
         self._residual(x, control)
         self.a.set(0)
         self.reached = control, 0.0
-        self._modified.begin(problem.setting, chords and not problem.has_kinks)
+        self._modified.begin(problem.setting, chords and not problem.contact.faces)
         work0 = moved = 0.0
         active = ActiveSetChanges(problem, self.settings.small_correction)
-        points = LocalSolve(problem) if problem.has_kinks else None
+        points = LocalSolve(problem) if problem.contact.faces else None
         while True:
             residual = relative(problem, self.F.norm(), self.settings.force_floor)
             if not np.isfinite(residual):
-                raise Failure(f"the forces are not finite: {problem.why_not_finite}", history)
+                raise Failure(f"the forces are not finite: {problem.description.why_not_finite}", history)
             if history:
                 self._modified.note_iteration(history[-1].chord, residual / (history[-1].residual or 1.0))
             if self.tolerances.converged([i.correction for i in history], [*[i.residual for i in history], residual],
-                                   bool(history) and history[-1].chord, not problem.has_kinks):
+                                   bool(history) and history[-1].chord, not problem.contact.faces):
                 history.append(Iteration(residual, 0.0, 0.0))
                 return control, history
-            problem.linearise(x, control, self.F)
+            problem.contact.linearise(x, control, self.F)
             active.compare(moved)
             if points:
                 points.mark_changes()
@@ -393,7 +393,7 @@ class BorderedNewton:
             if points and active.changed == len(history) != self.settings.uncorrected_iteration:
                 border = BorderedTangent(self.gradient, self.b, self._slope)
                 step, share = points.correct(self.solver, self.a, step, border), 1.0
-                if points.failed == 2 and problem.has_history:
+                if points.failed == 2 and problem.history.path_dependent:
                     raise Failure("contact does not settle: no combination of touching, sticking and sliding is"
                                   " in equilibrium at the points that change", history)
             work = abs(self.F.dot(self.a))
@@ -422,7 +422,7 @@ class BorderedNewton:
         settings, quiet = self.settings, history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
         diverged = len(history) > 2 and min([i.correction for i in history[-3:]]) > settings.divergence_correction
-        if diverged or grown and not (self.problem.has_kinks and moved < settings.small_correction):
+        if diverged or grown and not (self.problem.contact.faces and moved < settings.small_correction):
             raise Failure("Newton's method diverges", history)
         if active.returns >= settings.max_cycles:
             raise Failure("contact does not settle: the same points change between open, sticking and sliding"

@@ -69,7 +69,7 @@ class Run:
                  requested: Target | None = None):
         self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
         self._accuracy = accuracy
-        self._time_error = TimeError(self.problem, accuracy) if self.problem.relaxes else None
+        self._time_error = TimeError(self.problem, accuracy) if self.problem.history.rate_dependent else None
         self.targets = RunTargets(self.curve, targets, requested)
         self._step, self._began = step, time.perf_counter()
         self._jumps = JumpRules(self.curve, self.targets, self.settings.snap_through, at_limit_point or "")
@@ -107,7 +107,7 @@ class Run:
                     self._stop_if(self.targets.jumped_past(state))
                     if state.kind == "limit point" and self._jumps.rule == "stop":
                         record.ended = f"the {self._control_name} has a limit point at {record.describe(state)}"
-                    if record.ended or self.problem.has_history or self._jumps.rule == "snap_through":
+                    if record.ended or self.problem.history.path_dependent or self._jumps.rule == "snap_through":
                         break                           # the next step starts from this state
                     if not self.targets.is_open() and state.target is self.targets.until:
                         break
@@ -126,7 +126,7 @@ class Run:
     @property
     def _control_name(self) -> str:
         """Name of the controlled quantity."""
-        return self.problem.shown(0.0)[0]
+        return self.problem.description.shown(0.0)[0]
 
     @property
     def _target_is_control(self) -> bool:
@@ -194,7 +194,7 @@ class Run:
         smallest step has failed. It may also be tried after two failures, if the step is short. This is not done at a
         first state with history variables, nor near the control of an earlier snap-through without equilibrium.
         """
-        first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.limit, None
+        first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.contact.limit, None
         lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
         self._orientation = OrientationCheck(self.curve, self.settings.snap_through.lengths[0])
         if snaps(self.curve, old, self._jumps.rule, self._sense):
@@ -225,8 +225,9 @@ class Run:
                 good, failed = self.step.failed(), failed + (not isinstance(failure, _PassedState))
                 self._failed(failure.reason, self.step.length)
                 self._trial = self._trial._replace(events=None if failed > 1 else self._trial.events)
+                begins = old.kind == "start" and self.problem.history.path_dependent
                 early = self._jumps.tried_early and failed > 1 and length < lengths[0] and not (
-                    old.kind == "start" and self.problem.has_history or self._jumps.found_no_equilibrium_near(old))
+                    begins or self._jumps.found_no_equilibrium_near(old))
                 if self._jumps.allowed and (not good or early):
                     lengths.pop(0)
                     for start_length in (reach,) if good else (last, 0.0):
@@ -253,9 +254,10 @@ class Run:
         target: target within the step, or None. quantity: its output quantity. end: control at the end of the step, in
         place of its length, or None. A failed step raises `Failure`, and a step that is too long raises `Cutback`.
         """
-        limit = self.problem.limit
+        limit = self.problem.contact.limit
         bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
-        earlier = None if self.problem.has_kinks else predictor.parabola_state(self.states, reach, self.curve.distance)
+        smooth = not self.problem.contact.faces
+        earlier = predictor.parabola_state(self.states, reach, self.curve.distance) if smooth else None
         with self.curve.newton.limited_settling(length > self.settings.snap_through.lengths[0]):
             if target is not None and quantity is not None:
                 new = self.curve.step_to(old, reach, quantity.equation(target.value), self._predictor, earlier, bend)
@@ -276,13 +278,13 @@ class Run:
         if was_passed(self.curve, self.states[:-1], old, new):
             raise _PassedState("the iteration fell back to a part of the path that was passed already", [])
         self._orientation.check(old, new)
-        error, variables = self._error_in_time(new), self.problem.history_variables
+        error, variables = self._error_in_time(new), self.problem.history.variables
         try:
             if limit and limit.corrections:
                 new = limit.corrections.separate(self.curve, old, new, lambda state: self._jump(state, 0.0))
             states, self._jumps.change = self._states_within(old, new), self.settings.snap_through.control_change
         except Failure:
-            self.problem.history_variables = variables
+            self.problem.history.variables = variables
             raise
         if target is None and length == self.step.length:   # not a step that contact has shortened
             self.step.accepted(tangents(new.history) - (limit.settling if limit else 0), error)
@@ -294,11 +296,11 @@ class Run:
 
         None unless the material relaxes, time passes with the control, and the residual F has no kinks.
         """
-        if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.has_kinks:
+        if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.contact.faces:
             return None
 
         def x(control: float) -> Array | None:
-            time = self.problem.time_at(control)
+            time = self.problem.history.time_at(control)
             past = predictor.recent_states(self.states, time, predictor.CUBIC)
             return predictor.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
         return x
@@ -354,9 +356,9 @@ class Run:
         To give up is to raise a `ConvergenceError`.
         """
         control = self.record.last.control
-        reason = self.problem.implausible(control)
+        reason = self.problem.description.implausible(control)
         if reason is not None:
-            value = self.problem.shown(control)[1]
+            value = self.problem.description.shown(control)[1]
             self._give_up(f"the {self._control_name} has come to {value:.4g}, beyond any process: {reason}")
         self._stop_if(self.targets.stalled())
 
@@ -396,7 +398,7 @@ class Run:
 
         Contacts in three dimensions open and close points between steps only.
         """
-        corrections = self.problem.limit and self.problem.limit.corrections
+        corrections = self.problem.contact.limit and self.problem.contact.limit.corrections
         if not corrections or new.kind == "limit point":
             return new
         equation = next((quantity.equation(target.value) for target, quantity in self.targets.open
@@ -412,8 +414,8 @@ class Run:
             if not self.states:
                 raise
             self._give_up("at {} {:.6g}: {}; allow_inadmissible=True goes on".format(
-                *self.problem.shown(state.control), inadmissible), hint="")
-        if self.problem.has_kinks:
+                *self.problem.description.shown(state.control), inadmissible), hint="")
+        if self.problem.contact.faces:
             self.curve.update_path_tangent(state)
         self.targets.accept(state)
         record.counts.iterations += self.curve.spent()

@@ -64,7 +64,7 @@ class Execution:
         self.record, self.curve, self.problem = record, record.curve, problem
         self.plans, self._unchecked, self._check, self._step, self._balanced = plans, unchecked, check, step, balanced
         self._accuracy = accuracy
-        self._unloaded, nothing = np.zeros(problem.x.getLocalSize()), [0.0] * len(problem.scales)
+        self._unloaded, nothing = np.zeros(problem.x.getLocalSize()), [0.0] * len(problem.description.scales)
         self._constant = StepData(nothing, nothing, [])
         self._targets = [self._bind(plan) for plan in plans]    # compile before the first stage
         problem.enter(self._constant, self._unloaded, 0.0)
@@ -136,7 +136,7 @@ class Execution:
     def _present_value(self, number: int) -> float:
         """Return the current value of an item, in the user's units; number: index of the item in `Scene.items`."""
         setting, _, control = self._present()
-        return setting.amplitude(number, control) * self.problem.scales[number]
+        return setting.amplitude(number, control) * self.problem.description.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
         """Set new step data in the problem for a piece of the stage; an amplitude is base + rate times the control.
@@ -171,8 +171,8 @@ class Execution:
         end it first.
         """
         step = self._stage.step or self._step
-        if control is not None and self.problem.setting.rate[-1] and self.problem.relaxes:
-            only_time = self.problem.has_kinks and not any(self.problem.setting.rate[:-1])
+        if control is not None and self.problem.setting.rate[-1] and self.problem.history.rate_dependent:
+            only_time = self.problem.contact.faces and not any(self.problem.setting.rate[:-1])
             step = step or (_CONTACT_IN_TIME if only_time else _IN_TIME)    # a continued piece has its own steps
         run = Run(self.record, targets, step, self._stage.at_limit_point, self._accuracy, self._label, requested)
         start = None if control is None else self._resumed(control)
@@ -189,7 +189,7 @@ class Execution:
         if not begun:
             for i in set(before.inactive) - set(self._inactive):
                 try:
-                    self.problem.activate(i, x, control)
+                    self.problem.contact.activate(i, x, control)
                 except InputError as error:
                     raise InputError(f"{self._stage.label}: {error}") from None
             still, fading = [0.0] * len(before.base), bool(self.record.states) and before.inactive != self._inactive
@@ -222,7 +222,8 @@ class Execution:
 
         clocked: True if process time may pass while the control changes.
         """
-        base, rate, control = control_step_data(self._amplitudes(), self.problem.scales, numbers, self._stage, clocked)
+        base, rate, control = control_step_data(self._amplitudes(), self.problem.description.scales, numbers,
+                                                self._stage, clocked)
         self._enter(base, rate, 1, control)
         return control
 
@@ -234,7 +235,7 @@ class Execution:
     def _amplitudes(self) -> list[float]:
         """Return the current dimensionless amplitudes of all items, then the process time."""
         setting, _, control = self._present()
-        return [*setting.amplitudes(control)[:-1], self.problem.time_at(control)]
+        return [*setting.amplitudes(control)[:-1], self.problem.history.time_at(control)]
 
     def _prescribe(self, numbers: list[int], begun: bool) -> None:
         """Run, or continue if `begun`, a stage in which an output quantity follows an amplitude in time.
@@ -277,7 +278,7 @@ class Execution:
         """
         before, _, control = self._present()
         stage, through = self._stage, self._open_targets()
-        now = before.base[-1] if piece else self.problem.time_at(control)
+        now = before.base[-1] if piece else self.problem.history.time_at(control)
         end = end_time(stage, tables, now)
         if not piece:
             self._check_beginning(tables, now, end)
@@ -293,7 +294,7 @@ class Execution:
     def _enter_line(self, tables: list[tuple[int, Array]], now: float, then: float, piece: int) -> None:
         """Set the step data of a piece between two process times, between which all tables, shape (n, 2), are linear.
         """
-        base, rate = table_step_data(self._amplitudes(), self.problem.scales, tables, now, then)
+        base, rate = table_step_data(self._amplitudes(), self.problem.description.scales, tables, now, then)
         self._enter(base, rate, piece, 0.0)
 
     def _run_piece(self, then: float, through: _Targets, begun: bool) -> _Targets:
@@ -301,7 +302,7 @@ class Execution:
 
         Raise `ConvergenceError` if a target that ends the stage was not met within its duration.
         """
-        if self.problem.setting.is_constant and not self.problem.relaxes:   # only time passes, without an effect
+        if self.problem.setting.is_constant and not self.problem.history.rate_dependent:   # time has no effect
             if not begun:
                 self._accept_known(self._resumed(0.0))
             if self.record.last.control < 1.0:
@@ -332,7 +333,7 @@ class Execution:
                 raise InputError(f"{caller}: the table of {name} begins at time {first[0]:g}, but the process time is"
                                  f" {now:g} already: it goes back in time")
             stands = self._present_value(i)
-            size = max(np.abs(table[:, 1]).max(), self.problem.scales[i])
+            size = max(np.abs(table[:, 1]).max(), self.problem.description.scales[i])
             if first[0] <= now + SAME_TIME * abs(now) and abs(stands - first[1]) > 1e-9 * size:
                 raise InputError(f"{caller}: the table of {name} begins with {first[1]:g} at time {first[0]:g}, but it"
                                  f" stands at {stands:g} then")
@@ -364,7 +365,7 @@ def begin(curve: Curve) -> State:
         return curve.start()
     except Failure as failure:
         first, rest = problem.setting, np.zeros(problem.x.getLocalSize())
-        if not problem.fixed_loads:
+        if not problem.description.fixed_loads:
             raise _no_start(curve, failure) from None
         record = Record(problem, curve)
         target = change_completed()
@@ -372,7 +373,7 @@ def begin(curve: Curve) -> State:
             problem.enter(replace(first, rate=[0.0] * len(first.rate), fading=True), rest, 0.0)
             run = Run(record, [(target, target.bind(problem))])
             # the unbalanced loads have faded: a flat membrane leaves the reference configuration as under a driven load
-            run.follow(1000, False, curve.start() if problem.singular_unloaded else curve.resume(rest, 0.0))
+            run.follow(1000, False, curve.start() if problem.reference.singular else curve.resume(rest, 0.0))
         except (ConvergenceError, Failure):
             raise _no_start(curve, failure) from None
         problem.enter(first, record.last.x, 0.0)
@@ -381,9 +382,9 @@ def begin(curve: Curve) -> State:
 
 def _no_start(curve: Curve, failure: Failure) -> ConvergenceError:
     """Return the error of a run without a first state; `failure`: the failure of Newton's method."""
-    loads = curve.problem.fixed_loads
+    loads = curve.problem.description.fixed_loads
     words = f", under {', '.join(loads)}" if loads else ""
-    touches = "; a tool touches the body at rest: give its Contact a smaller ramp" * bool(curve.problem.active_contacts)
+    touches = "; a tool touches the body at rest: give its Contact a smaller ramp" * bool(curve.problem.contact.faces)
     advice = "; drive the largest of them instead" if loads else touches
     problem: Any = curve.problem                            # the cause lies in its scene
     scene = getattr(problem, "scene", None)

@@ -160,11 +160,11 @@ class Record:
 
         Raise `InadmissibleState` if no body can have this state; the record is then unchanged.
         """
-        problem, variables = self.equations, self.equations.history_variables
-        problem.advance(state.x, state.control)
-        state.history_variables, state.history_variables_before = problem.history_variables, variables
+        problem, variables = self.equations, self.equations.history.variables
+        problem.history.advance(state.x, state.control)
+        state.history_variables, state.history_variables_before = problem.history.variables, variables
         state.stage, state.setting = self.stage, asdict(problem.setting)
-        state.time = problem.time_at(state.control)
+        state.time = problem.history.time_at(state.control)
         self.segments[-1].states.append(state)
         try:
             for listener in self.hooks.on_state:
@@ -174,7 +174,7 @@ class Record:
                 raise InadmissibleState(state.inadmissible_reason)
         except BaseException:
             self.segments[-1].states.pop()
-            problem.history_variables = variables
+            problem.history.variables = variables
             raise
         if state.inadmissible_reason and not any(s.inadmissible_reason for s in self.states[-2:-1]):
             log.warning("beyond %s: %s", self.describe(state), state.inadmissible_reason)
@@ -186,7 +186,7 @@ class Record:
         `entries` are numbers, lists and dicts that a checkpoint can hold.
         """
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
-                              "column": self.equations.shown(0.0)[0].replace(" ", "_"), **entries}
+                              "column": self.equations.description.shown(0.0)[0].replace(" ", "_"), **entries}
         for listener in self.hooks.on_step:
             listener()
 
@@ -196,5 +196,5 @@ class Record:
         Values that no body can have are left out, such as the pole stretch of a wall whose thickness is not positive.
         """
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
-            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.main_columns
+            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.description.main_columns
             if abs(state.measures.get(k, math.inf)) < 1e100)

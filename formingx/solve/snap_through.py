@@ -197,7 +197,7 @@ class _Motion:
             self.curve.spend(len(failure.history))
             return self._reject()
         self.curve.spend(len(history) - 1)
-        x, limit = self._x.array_r.copy(), self.problem.limit
+        x, limit = self._x.array_r.copy(), self.problem.contact.limit
         last, new = self.state, replace(self.state, x=x, control=self.control)
         if self.problem.has_inverted_element(self._x, self.control) or limit and limit.passes_through(last, new):
             return self._reject()
@@ -213,7 +213,7 @@ class _Motion:
         self.settles = self.unbalanced < min(self.trial_force, before)
         self._add_dissipation(origin, x, pull)                         # from the last or the predicted position
         self._pull, self.state = pull, new
-        self.problem.advance(x, self.control)
+        self.problem.history.advance(x, self.control)
         if limit:
             limit.prepare(TrialStep(x, self.control, x - last.x, 0.0, 1.0))
         self.solved += 1
@@ -238,7 +238,7 @@ class _Motion:
             if self.unbalanced > self._settings.equilibrium_force:
                 self.settles, self.trial_force = False, 0.3 * self.unbalanced
                 return None
-            if not self.problem.has_history:                # another branch starts here
+            if not self.problem.history.path_dependent:                # another branch starts here
                 raise
             state = self.curve.resume(self.state.x, self.control)
             state.kind, state.history = "jump", [Iteration(self.unbalanced, 0.0, 0.0)]
@@ -246,7 +246,7 @@ class _Motion:
             self.settles, self.trial_force = False, 0.3 * self.unbalanced
             return None
         self._add_dissipation(self.state.x, state.x, np.zeros(len(state.x)))
-        energy, length = self.problem.units
+        energy, length = self.problem.description.units
         state.jump = {"dissipated": self.dissipated * energy, "moved": self.curve.moved(self._old, state) * length}
         return state
 
@@ -281,7 +281,7 @@ def snap_through(curve: Curve, old: State, change: float, from_tangent: bool, se
     (0: either), and the body must not return to the states `passed`. Raise `Failure` if no state was found,
     `NoEquilibrium` if the body moved without one. The history variables are then those of `old`.
     """
-    problem, kept = curve.problem, curve.problem.history_variables
+    problem, kept = curve.problem, curve.problem.history.variables
     motion = _Motion(curve, old, old.control + change, settings, work_sign, passed)
     origin = old.x + change / old.slope * old.direction if from_tangent else old.x
     eta, solutions = settings.first_viscosity, solutions or settings.max_solutions
@@ -301,7 +301,7 @@ def snap_through(curve: Curve, old: State, change: float, from_tangent: bool, se
             Failure, "even the largest artificial viscosity finds no next state")
         raise kind(f"no equilibrium is found that the body could snap to: {where}", [])
     except Failure:
-        problem.history_variables = kept
+        problem.history.variables = kept
         raise
     finally:
         motion.destroy()
@@ -348,14 +348,14 @@ class JumpRules:
     @property
     def allowed(self) -> bool:
         """True if `rule` snaps, or is "continue" and the path may end at a kink of F (contact, history variables)."""
-        may_end = self._problem.has_history or self._problem.has_kinks
+        may_end = self._problem.history.path_dependent or bool(self._problem.contact.faces)
         return self.rule in ("snap_through", "continue_volume") or self.rule == "continue" and may_end
 
     @property
     def tried_early(self) -> bool:
         """True if a snap-through is tried after two failed steps, False if only after the smallest step has failed.
         False for a pressure with history variables, since slip in the viscous motion changes the final state."""
-        return self.rule in ("snap_through", *["continue_volume"] * (not self._problem.has_history))
+        return self.rule in ("snap_through", *["continue_volume"] * (not self._problem.history.path_dependent))
 
     def found_no_equilibrium_near(self, old: State) -> bool:
         """Return True if an earlier snap-through, at nearly the control of `old`, reached no equilibrium."""
@@ -371,7 +371,7 @@ class JumpRules:
         """
         fading, settings = self._problem.setting.fading, self._settings
         others = (settings.control_change, settings.max_control_change) if (
-            length == 0 and self._problem.has_history and not fading) else ()
+            length == 0 and self._problem.history.path_dependent and not fading) else ()
         failure: Failure | None = None
         for next_change in dict.fromkeys((self.change, *others)):
             self.change = next_change
@@ -398,10 +398,10 @@ def at_limit_points(problem: Equations, decreases: bool) -> str:
     "continue" follows the path: without history variables, except for a pressure in contact. "continue_volume" snaps at
     a maximum of the volume: for an increasing pressure with history variables or contact. Else "snap_through".
     """
-    if problem.control_kind == "time":
+    if problem.description.control_kind == "time":
         return "snap_through"
-    by_pressure = problem.control_kind == "pressure"
-    if not (problem.has_history or problem.has_kinks and by_pressure):
+    by_pressure = problem.description.control_kind == "pressure"
+    if not (problem.history.path_dependent or problem.contact.faces and by_pressure):
         return "continue"
     return "continue_volume" if by_pressure and not decreases else "snap_through"
 

@@ -108,12 +108,12 @@ class TimeError:
     def ratio(self, states: Sequence[State], x: Array, control: float) -> float:
         """Return the error of a step, at its end or persistent, over its tolerance; x: shape (n,). 0 if no time passes.
         """
-        time = self._problem.time_at(control)
+        time = self._problem.history.time_at(control)
         past = predictor.recent_states(states, time, predictor.QUADRATIC - 1)
         end = State(x, control, x, 0.0, time=time)
         middle = (past[-1].time + time) / 2
         share = predictor.weights([*past, end], middle) if time > past[-1].time else np.array([])
-        once, lasting = self._problem.step_error(past, share, x, control)
+        once, lasting = self._problem.history.step_error(past, share, x, control)
         return max(once / self._once, lasting / self._adding_up)
 
 

@@ -31,8 +31,7 @@ from ..._jit import CFunctions
 from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
 from ...solve.arc_length import Curve
-from ...solve.equations import Array, Equations
-from ...solve.local_contact import unit_forces
+from ...solve.equations import Array
 from ...solve.state import State
 from ...values.tolerances import FAR
 
@@ -58,7 +57,7 @@ class BodyResponse:
 
     def __init__(self, curve: Curve, state: State, x: PETSc.Vec, F: PETSc.Vec):
         self._newton, self._state, self._made = curve.newton, state, curve.newton.solver.count
-        self._problem: Equations = curve.problem
+        self._problem: Any = curve.problem                  # it knows its constrained unknowns, too
         self._normal = curve.plane_normal(state)
         self._x, self._F = x, F
 
@@ -69,7 +68,7 @@ class BodyResponse:
 
     def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
         """Return dx, shape (n, m), dcontrol, (m,), by forces -1 at chosen owned points; None if K changed."""
-        return self._solve(unit_forces(self._problem, self._problem.active_contacts, chosen)) if self.is_valid else None
+        return self._solve(self._problem.contact.unit_forces(chosen)) if self.is_valid else None
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
         """Return one modified Newton correction of (x, control), x of shape (n,), with given contact forces.
@@ -81,11 +80,11 @@ class BodyResponse:
             return None
         self._x.array_w[:] = x
         try:
-            for face, given in zip(self._problem.active_contacts, forces, strict=True):
+            for face, given in zip(self._problem.contact.faces, forces, strict=True):
                 face.apply(given)
             self._problem.residual(self._x, control, self._F)
         finally:
-            for face in self._problem.active_contacts:
+            for face in self._problem.contact.faces:
                 face.apply(None)
         left = self._F.array_r.copy()
         left[self._problem.constrained] = 0.0

@@ -67,7 +67,7 @@ class _PerturbedPaths:
         Without derivatives by the parameters a `Failure` says why.
         """
         states = self.path.states
-        history = self.problem.has_history
+        history = self.problem.history.path_dependent
         if history and any(state.kind == "jump" for state in states):
             jump = next(state for state in states if state.kind == "jump")
             raise Failure(f"the body snaps at {self.path.record.describe(jump)}, where the result does not depend"
@@ -120,20 +120,20 @@ class _PerturbedPaths:
             current = problem.setting
             started = run.x is not None
             amplitudes = [0.0] * len(current.base) if not started else [
-                *current.amplitudes(run.control)[:-1], problem.time_at(run.control)]
+                *current.amplitudes(run.control)[:-1], problem.history.time_at(run.control)]
             x = run.x if started else np.zeros(problem.x.getLocalSize())
             if started:
                 for number in set(current.inactive) - set(setting.inactive):
-                    problem.activate(number, x, run.control)
+                    problem.contact.activate(number, x, run.control)
             if setting.piece == 0:
                 base, rate, control = amplitudes, [0.0] * len(amplitudes), 0.0
             elif p.by_time:
                 time = current.base[-1] + current.rate[-1] * run.control if started else 0.0
                 piece_end = next_knot(p.tables, time, end_time(p.stage, p.tables, time))
-                base, rate = table_step_data(amplitudes, problem.scales, p.tables, time, piece_end)
+                base, rate = table_step_data(amplitudes, problem.description.scales, p.tables, time, piece_end)
                 run.piece_end, control = piece_end, 0.0
             else:
-                base, rate, control = control_step_data(amplitudes, problem.scales, p.numbers, p.stage,
+                base, rate, control = control_step_data(amplitudes, problem.description.scales, p.numbers, p.stage,
                                                         clocked=not p.prescribes_quantity)
             problem.enter(replace(setting, base=base, rate=rate), x, control)
             run.control = control
@@ -208,7 +208,7 @@ class _PerturbedPaths:
         for number, face in enumerate(self.problem.contacts):
             if not face.law.has_history or not face.active:
                 continue
-            base = state.history_variables[self.problem.histories.index(face)]
+            base = state.history_variables[self.problem.history.parts.index(face)]
             free = base.history.distance <= -face.law.theta
             closing = np.flatnonzero(self._closing[number] if self._closing else 0 * free)
             free[closing] = True
@@ -225,7 +225,7 @@ class _PerturbedPaths:
                         self._velocity[number][closing], base.history.distance[closing])
                 perturbed.put(variables._replace(history=history, newly_closed=base.newly_closed))
         for run in self.runs:
-            run.history_variables = run.problem.history_variables
+            run.history_variables = run.problem.history.variables
         self._closing = []
 
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
@@ -236,7 +236,7 @@ class _PerturbedPaths:
         """
         setting = self.problem.setting
         if not last:
-            timed = setting.rate[-1] and self.problem.relaxes
+            timed = setting.rate[-1] and self.problem.history.rate_dependent
             constraint = fixed(state.control)
             return (constraint, [constraint] * len(self.runs)) if timed else self._gap_constraints()
         if setting.piece == 0 and not self._single:          # the stage change ends at control 1

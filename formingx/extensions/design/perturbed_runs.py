@@ -100,7 +100,7 @@ class PerturbedRun:
             raise InputError(f"Design: {name} changes the number of unknowns: there is no derivative by that")
         self.F, self.gradient = self.problem.x.duplicate(), self.problem.x.duplicate()
         self.x: Any = None                                   # locally owned entries, shape (n,)
-        self.control, self.history_variables = 0.0, self.problem.history_variables
+        self.control, self.history_variables = 0.0, self.problem.history.variables
         self.plans: list[Any] = []
         self.piece_end = 0.0
         self._start: _Start | None = None
@@ -112,14 +112,14 @@ class PerturbedRun:
     def advance(self) -> None:
         """Update the history variables at the end of a step, as a run does: heat needs the start of the step, too."""
         if self._start is not None:
-            self.problem.predict(self._start, self.x, self.control)
-        self.problem.advance(self.x, self.control)
+            self.problem.history.predict(self._start, self.x, self.control)
+        self.problem.history.advance(self.x, self.control)
         self.begin_step()
 
     def state(self, base: State) -> State:
         """Return the present state as a `State`, with tangent, stage and kind of the base state."""
         return State(self.x, self.control, base.direction, base.slope, history_variables=self.history_variables,
-                     stage=base.stage, kind=base.kind, time=self.problem.time_at(self.control))
+                     stage=base.stage, kind=base.kind, time=self.problem.history.time_at(self.control))
 
     def residual(self, base_residual: np.ndarray) -> np.ndarray:
         """Return the residual minus that of the base run; both of locally owned entries, shape (n,)."""
@@ -136,7 +136,7 @@ class PerturbedRun:
         forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
         F = self.residual(base_residual)[: self.problem.n_owned]
         unit = forms.stress * forms.volume / forms.length
-        for face in self.problem.active_contacts:
+        for face in self.problem.contact.faces:
             touching = face.rule.dofs[face.touching(fields, self.control)]
             for c in range(len(face.unbalanced)):
                 numbers = np.unique(touching[:, c::len(face.unbalanced)])
@@ -198,7 +198,7 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
                 run.control - state.control))
         return run.constraint(equations[k]) - residual
     size = _norm(problem, state.x) + abs(state.control)
-    tolerance = _TOLERANCES.tolerance_in_contact if problem.has_kinks else ROUND_OFF
+    tolerance = _TOLERANCES.tolerance_in_contact if problem.contact.faces else ROUND_OFF
     active, first = list(range(len(perturbed))), np.full(len(perturbed), np.inf)
     least = np.full(len(perturbed), np.inf)                  # smallest correction so far
     for iteration in range(Tolerances.iterations):

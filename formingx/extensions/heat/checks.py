@@ -199,7 +199,7 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
     """
     reported = {finding.about for finding in path.record.findings}
     states = path.record.segments[-1].states
-    for k, history in enumerate(path.problem.histories):
+    for k, history in enumerate(path.problem.history.parts):
         if isinstance(history, CoolingHistory):
             limits = path.problem.temperature.limits             # elements overshoot next to a chilled face
             temperatures = [np.clip(state.history_variables[k].temperature, *limits) for state in states]
@@ -236,6 +236,6 @@ def _outside_known_range(scene: Any, low: float, high: float, cause: str) -> Ite
 @register("end")
 def temperature_errors(path: Any) -> Iterator[Finding]:
     """Yield a warning if the mesh is too coarse for the temperature, in states on the last mesh; collective."""
-    for history in path.problem.histories:
+    for history in path.problem.history.parts:
         if isinstance(history, CoolingHistory):
             yield from history.findings(path.record.segments[-1].states)

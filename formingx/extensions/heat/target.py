@@ -41,7 +41,7 @@ class PointTemperature(Quantity):
         self._short = NEGLIGIBLE * scene.heat.time_through(scene.mesh, thickness)
 
     def value(self, x, control):
-        return self._at(self._problem.time_at(control), control)
+        return self._at(self._problem.history.time_at(control), control)
 
     def _at(self, time: float, control: float) -> float:
         """Return the temperature at a process time; that of an accepted state is the one found before it."""
@@ -107,7 +107,7 @@ def temperature(value: float, *, at: Sequence[float], depth: float | None = None
         raise InputError(f"temperature: depth = {depth!r}: must be from 0, the bottom face, to 1, the top face")
 
     def bind(problem: Any) -> PointTemperature:
-        found = [history for history in problem.histories if isinstance(history, CoolingHistory)]
+        found = [history for history in problem.history.parts if isinstance(history, CoolingHistory)]
         scene = problem.scene
         if not found:
             raise InputError(f"temperature = {wanted:g}: the temperature of the scene does not change: give Scene"

@@ -36,7 +36,7 @@ def thins(failure: Any) -> Iterator[Finding]:
         return
     problem, drawn = failure.problem, None
     with problem.state_context(failure.last):
-        for past in (history for history in problem.materials if isinstance(history, PastStates)):
+        for past in (history for history in problem.history.materials if isinstance(history, PastStates)):
             limit = past.material.base.rupture_stretch("equibiaxial")
             smallest, point = past.smallest_stretch()
             if (stretch := smallest**-0.5) > max(limit, drawn[0] if drawn else 0.0):

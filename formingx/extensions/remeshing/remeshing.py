@@ -163,7 +163,7 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
     poor = bool(record.states) and _needs_remeshing(record, record.last, remesh)
     failed: list[State] = []
     while not (poor and done()):
-        record.problem.limit.end_at_closures()                    # check the mesh at each gap closure
+        record.problem.contact.limit.end_at_closures()                    # check the mesh at each gap closure
         if poor:
             try:
                 _start_new_mesh(path, remesh, tolerances)
@@ -215,7 +215,7 @@ def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
     except BaseException:
         record.segments.pop()                                # no state on the new mesh: the path ends before it
         raise
-    if segment.problem.has_kinks:
+    if segment.problem.contact.faces:
         segment.curve.update_path_tangent(start)
     record.counts.iterations += segment.curve.spent()
     name, value = stepping["until"]
@@ -308,13 +308,13 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
                     lambda x, names: _moved_out_of_tools(x, names, contacts))
     new_scene = scene_on_new_mesh(mesh, StateTransfer.of(old, state))
     problem = Problem(new_scene)
-    problem.limit.end_at_closures()
-    setting, control = old.setting.transferred(old.scales, problem.scales, state.control)
+    problem.contact.limit.end_at_closures()
+    setting, control = old.setting.transferred(old.description.scales, problem.description.scales, state.control)
     curve = Curve(problem, tolerances)
     x = new_scene.state_transfer.unknowns(problem)
     problem.enter(setting, x, control)
     if not setting.rate[-1]:
-        problem.clock = state.time
+        problem.history.clock = state.time
     transfer_histories(old, state, problem, x, control, moved=True)
     for new, (_, before, _) in zip(problem.contacts, contacts, strict=True):
         transfer_contact(new, before, x[: problem.n_owned], control)
@@ -344,7 +344,7 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
     except Failure as failure:
         reason = failure.reason
     log.info("the forces that a new mesh leaves without balance are taken away gradually: %s", reason)
-    time = problem.time_at(control)
+    time = problem.history.time_at(control)
     constant = replace(first, base=[*first.amplitudes(control)[:-1], time], rate=[0.0] * len(first.rate), fading=True)
     record, target = Record(problem, curve), Target("change", 1.0, None)
     try:
@@ -354,7 +354,7 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
         raise ConvergenceError(f"remesh: no equilibrium was found on a new mesh: {error}; give Remesh another size, or"
                                f" a range of volume_ratio nearer to 1") from None
     problem.enter(first, record.last.x, control)
-    problem.clock += time - problem.time_at(control)         # the step data of a flow stage exclude it
+    problem.history.clock += time - problem.history.time_at(control)         # the step data of a flow stage exclude it
     return record.last.x
 
 

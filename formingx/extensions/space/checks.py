@@ -97,7 +97,7 @@ def unbalanced_loads(path: Any) -> Iterator[Finding]:
                                                                                        scale * held))
         each = combined(problem.comm, float(np.linalg.norm(works[nodes] / forms.length, axis=1).sum()))
         tools = sum(resultants.force(face, problem.x.array_r[:problem.n_owned], control)
-                    for face in problem.active_contacts)
+                    for face in problem.contact.faces)
     missed, planes = tools - supports - loads, [plane.axis for plane in path.scene.symmetry.planes]
     missed[planes] = loads[planes] = 0.0                      # balanced by the mirror image
     largest = max(float(np.linalg.norm(loads)), _LEAST_RESULTANT * each, 1e-300)         # in a tube they balance

@@ -56,7 +56,7 @@ class LaggedCorrections:
         constraint = equation or fixed(new.control)
         for sweep in range(LAGGED.max_solutions):
             late = any([c.correct(new.x[:self._n], new.control, equation is not None, sweep) for c in self._contacts])
-            variables = curve.problem.history_variables
+            variables = curve.problem.history.variables
             if not late and (equation is None or sweep > LAGGED.max_solutions / 2 or not self.renew(new)):
                 return new
             try:
@@ -65,7 +65,7 @@ class LaggedCorrections:
                 if late:
                     raise
                 log.info("the contact pressure at %s stays that of the last solution: %s", new.target, failure.reason)
-                curve.problem.history_variables = variables
+                curve.problem.history.variables = variables
                 return new
         raise Failure("points that come into contact late bring others into their tool again and again", [])
 

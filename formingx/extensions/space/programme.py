@@ -31,11 +31,6 @@ class WallProgramme(KeyNumbers):
         wanted: wanted minimum wall, length.
         converged: True if the minimum wall is within the tolerance of the wanted one.
         units: units of the labels.
-
-    >>> import numpy as np
-    >>> found = fx.WallProgramme(np.array([1.0, 1.2]), path, np.ones((1, 2)), np.array([0.5]), 0.5, True)
-    >>> found.thickness.tolist(), found.converged
-    ([1.0, 1.2], True)
     """
 
     thickness: np.ndarray

@@ -46,7 +46,7 @@ class SheetBalance(EnergyBalance):
         for state in (a, b):
             with self._problem.state_context(state) as problem:
                 fields, forces = state.x[: problem.n_owned], []
-                for contact in problem.active_contacts:
+                for contact in problem.contact.faces:
                     own = contact.area[:, None] * contact.tractions(fields, state.control).force
                     all_forces = contact.forces(fields, state.control)
                     forces.append((_has_friction(contact), contact.positions(fields, state.control), own,

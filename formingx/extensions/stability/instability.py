@@ -172,10 +172,10 @@ class Stability:
 
     def __str__(self) -> str:
         problem = self.path.problem
-        name, unit = problem.shown(0.0)[0], "n" if problem.scene.kinematics.axisymmetric else "k"
+        name, unit = problem.description.shown(0.0)[0], "n" if problem.scene.kinematics.axisymmetric else "k"
         head = (f"stability: {unit} = {', '.join(f'{n:g}' for n in self.numbers)}, {len(self.states)} states; elastic,"
                 f" at fixed {name}")
-        if any(entry.relaxes for entry in (s.problem for s in self.path.record.segments)):
+        if any(entry.history.rate_dependent for entry in (s.problem for s in self.path.record.segments)):
             head += "; relaxing materials with their stiffness of the instant"
         unstable = [f"{unit} = {n:g}" for (n, _), found in self.counts.items() if found[0]]
         lines = [head, *([f"  unstable from the first state on: {', '.join(unstable)}"] if unstable else [])]
@@ -289,7 +289,7 @@ class StabilityAnalysis:
             found.state.measures = {name: before[name] + found.fraction * (behind[name] - before[name])
                                     for name in before.keys() & behind.keys()}
         with segment.problem.state_context(found.left):
-            driven, control = segment.problem.shown(found.state.control)
+            driven, control = segment.problem.description.shown(found.state.control)
         return CriticalPoint(self._path, found, float(control), driven, limit, points, amplitudes)
 
 

@@ -176,7 +176,7 @@ class Modes:
         else:
             x, control = self.curve.interpolate(a, b, fraction)
             state = State(x, control, a.direction, a.slope, history_variables=a.history_variables, stage=a.stage,
-                          setting=a.setting, time=self.problem.time_at(control))
+                          setting=a.setting, time=self.problem.history.time_at(control))
         with self.problem.state_context(nearest.state):
             self.variation.fill(*kind)
             x = nearest.modes[np.argmin(abs(nearest.values))] if exact else self._mode_of_index(nearest, index)
@@ -212,7 +212,7 @@ class Modes:
 
         `Failure` reports no convergence, or convergence to another branch.
         """
-        if self.problem.has_history:
+        if self.problem.history.path_dependent:
             raise Failure("with a history the state between two others depends on the steps", [])
         with self.problem.state_context(a):
             state = self.curve.state_at_fraction(a, b, fraction)

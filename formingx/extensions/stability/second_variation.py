@@ -111,7 +111,7 @@ class SecondVariation:
         self._rows = rows
         self.negative_pivots = self._pressures + sum(bool(self.comm.allreduce(int(np.any(row)))) for row in rows)
         fields = problem.x.array_r[: problem.n_owned]
-        blocks = [self._contact_stiffness(contact, fields, m) for contact in problem.active_contacts]
+        blocks = [self._contact_stiffness(contact, fields, m) for contact in problem.contact.faces]
         guided = [self._guided_stiffness(fields, m)] if self._axisymmetric else []
         self._matrix.fill([*blocks, *guided])
         self.rigid_motions = self._find_rigid()

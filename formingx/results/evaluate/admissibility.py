@@ -115,7 +115,7 @@ class AdmissibilityCheck:
         with self._problem.state_context(state):
             edges, found = self._outline.edges(), list[Finding]()
             lengths = _lengths(edges)
-            for contact in self._problem.active_contacts:
+            for contact in self._problem.contact.faces:
                 error = _force_error(contact, state, self._images)
                 if error > WARNED_ERROR:
                     name = contact.contact.label
@@ -160,7 +160,7 @@ class AdmissibilityCheck:
                 yield (f"the body did not follow the tool of {deep.name!r}: contact points are {deep.depth:.4g} deep in"
                        f" it, {percent(deep.ratio * _LIMITS.penetration)} of the remaining wall: give Contact a"
                        f" penalty of {50 * deep.ratio * deep.contact.contact.penalty:.1g}")
-            for contact in problem.active_contacts:
+            for contact in problem.contact.faces:
                 error = _force_error(contact, state, self._images)
                 if error > LARGE_ERROR and resultants.penetration(
                         contact, state.x, state.control) > NEGLIGIBLE * contact.thickness:
@@ -206,7 +206,7 @@ class AdmissibilityCheck:
         if self._problem.scene.kinematics.components < 3:
             return
         with self._problem.state_context(state) as problem:
-            for contact in problem.active_contacts:
+            for contact in problem.contact.faces:
                 x = contact.positions(state.x, state.control)
                 depth, place = contact.law.distance(x), x + contact.tool_displacement(state.control)
                 rows = gathered(contact.comm, np.column_stack([depth / allowed(contact), depth, place]))

@@ -77,7 +77,7 @@ class ContactFace:
             moved = contact.points + path.problem.forms.length * contact.displacement(fields)
             gap = -contact.contact.tool.signed_distance(contact.positions(fields, state.control))
             traction = np.zeros_like(self.reference_points)
-            if contact in path.problem.active_contacts:
+            if contact in path.problem.contact.faces:
                 _, traction = resultants.traction(contact, fields, state.control)
         _, values = self._gathered(moved, gap)
         points, gap = values[:, :-1], values[:, -1]

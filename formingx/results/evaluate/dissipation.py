@@ -33,11 +33,11 @@ def dissipated_energy(segment: Segment, states: list[State], power: Quantity) ->
         x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
     with segment.problem.state_context(before) as problem:
         if not state.setting["rate"][-1]:
-            problem.clock = time
+            problem.history.clock = time
         time = problem.forms.time_at(control)
         problem.x.array_w[:] = x
         problem.set_fields(x, control)
-        for history in problem.materials:
+        for history in problem.history.materials:
             history.advance(x, control)
         half = power.value(problem.x, control)
     a, b = (s.measures["dissipated_power"] for s in (before, state))

@@ -38,7 +38,7 @@ def coarsest(path: Any, state: Any) -> SharpEdge | None:
         fields = problem.x.array_r.copy()
         free = np.ones(len(fields))
         free[problem.constrained] = 0
-        for contact in problem.active_contacts:
+        for contact in problem.contact.faces:
             if contact.contact.lagged or contact.contact.sticks or not contact.contact.separates:
                 continue
             x, law = contact.positions(fields, state.control), contact.tractions(fields, state.control)

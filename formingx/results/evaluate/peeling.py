@@ -35,7 +35,7 @@ def strongest(problem: Any, states: Sequence[Any]) -> Peeling | None:
     found = []
     for state in states:
         with problem.state_context(state):
-            for face in (face for face in problem.active_contacts if isinstance(face, FaceContact)):
+            for face in (face for face in problem.contact.faces if isinstance(face, FaceContact)):
                 if face.contact.sticks and face.contact.separates and not face.contact.lagged:
                     tractions = face.tractions(state.x[:problem.n_owned], state.control)
                     both = np.array([face.area @ np.abs(tractions.tangential), face.area @ tractions.normal])

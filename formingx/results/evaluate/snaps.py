@@ -40,7 +40,7 @@ def largest(path: Any) -> Snap | None:
     Only problems with history variables are examined: there the state after a snap-through depends on the motion to it.
     """
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
-    if not jumps or not path.problem.has_history:
+    if not jumps or not path.problem.history.path_dependent:
         return None
     found = []
     for k in jumps:

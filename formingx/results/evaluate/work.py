@@ -112,16 +112,16 @@ class EnergyBalance:
         for part, (start, end) in itertools.product(parts, [line] if self._flows(a, b) else [(a, b), line]):
             with problem.state_context(a):
                 if self._flows(a, b):
-                    problem.clock = a.time + part * (b.time - a.time)
-                problem.limit.prepare(TrialStep(a.x, a.control, start.direction, start.slope, part * h))
+                    problem.history.clock = a.time + part * (b.time - a.time)
+                problem.contact.limit.prepare(TrialStep(a.x, a.control, start.direction, start.slope, part * h))
                 try:
                     found = curve.state_at_fraction(start, end, part)
                 except Failure:                             # the contact iteration may converge elsewhere
                     continue
                 finally:
                     curve.spent()
-                problem.advance(found.x, found.control)
-                found.history_variables, found.setting = problem.history_variables, b.setting
+                problem.history.advance(found.x, found.control)
+                found.history_variables, found.setting = problem.history.variables, b.setting
                 return found
         return None
 
@@ -204,7 +204,7 @@ class EnergyBalance:
         with problem.state_context(state) as p:
             fields, n = p.x.array_r.copy(), p.n_owned
             e, d = DIFFERENCE_STEP, state.direction
-            back = 0 if p.body_has_history and p.setting.rate[-1] else 1        # a material relaxes forwards in time
+            back = 0 if p.history.body_path_dependent and p.setting.rate[-1] else 1     # it relaxes forwards in time
             before, after = (p.body_forces(fields + k * e * d, state.control + k * e * state.slope) for k in (-back, 1))
             change = scale * (after - before)[:n] / ((1 + back) * e)
             free = change.copy()
@@ -217,7 +217,7 @@ class EnergyBalance:
                     force = slope = 0.0
                 elif item in scene.contacts:
                     together = [scene.items[k] for k in scene.same_tool(i)]
-                    tools = [c for c in p.active_contacts if c.contact in together]
+                    tools = [c for c in p.contact.faces if c.contact in together]
                     force = -sum(float(resultants.force(c, fields, state.control) @ c.contact.travel_vector)
                                  for c in tools)
                     slope = sum(self._sum(free[self._nodes(c, fields, state.control)] @ c.contact.travel_vector)
@@ -244,7 +244,7 @@ class EnergyBalance:
         with self._problem.state_context(state) as problem:
             x, control = state.x[: problem.n_owned], state.control
             return self._sum([np.any(np.abs(c.law.distance(c.positions(x, control)) / c.law.theta + 1) < _RAMP_EDGE)
-                              for c in problem.active_contacts]) > 0
+                              for c in problem.contact.faces]) > 0
 
     def _friction(self, a: Any, b: Any) -> float:
         """Return the energy that friction on the modelled body dissipates from state a to state b, stress length^3.
@@ -256,7 +256,7 @@ class EnergyBalance:
         if a.setting != b.setting or not contacts:
             return lost
         with problem.state_context(a):
-            for c in (c for c in contacts if c in problem.active_contacts):
+            for c in (c for c in contacts if c in problem.contact.faces):
                 before[c] = c.positions(a.x[: problem.n_owned], a.control), c.history, _friction_of(c, a, problem)
         with problem.state_context(b):
             for c, (x, history, T) in before.items():
@@ -285,7 +285,7 @@ class EnergyBalance:
         """Return the energy stored in the contacts of the modelled body with adhesive tools in a state."""
         with self._problem.state_context(state) as p:
             return sum(resultants.energy(c, state.x[: p.n_owned], state.control)
-                       for c in p.active_contacts if c.law.adhesive)
+                       for c in p.contact.faces if c.law.adhesive)
 
     def _sum(self, values: Any) -> float:
         """Return the sum of an array, or of a number, over all entries and ranks; collective."""

@@ -131,7 +131,7 @@ class Checkpoint:
         final = self.folder / state_name(number)
         part = final.with_name(final.name + ".part")
         variables = [history.save(values)
-                     for history, values in zip(problem.histories, state.history_variables, strict=True)]
+                     for history, values in zip(problem.history.parts, state.history_variables, strict=True)]
         space = problem.forms.space
         data = _plain_state(state) | {"number": number, "memory": variables, "profile": _profile(self._path, state)}
         if state is segment.states[0] and segment is not self._path.record.segments[0]:
@@ -278,10 +278,10 @@ def _plain_state(state: State) -> dict[str, Any]:
 
 def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> list[Any]:
     """Return the history variables of a state from the dictionaries of its arrays, one per set; or an InputError."""
-    if len(variables) != len(problem.histories):
+    if len(variables) != len(problem.history.parts):
         raise InputError("checkpoint: its states have other histories (friction, relaxation, heat) than this scene: it"
                          " belongs to another scene")
-    return [history.load(data) for history, data in zip(problem.histories, variables, strict=True)]
+    return [history.load(data) for history, data in zip(problem.history.parts, variables, strict=True)]
 
 
 def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:
