@@ -6,6 +6,7 @@ import ufl
 from dolfinx import fem
 
 import formingx as fx
+from formingx import _compat
 from formingx.exact import heat as reference
 from formingx.extensions.heat import stepping
 from formingx.extensions.heat.conduction import Conduction
@@ -216,7 +217,7 @@ def test_heat_stored_is_heat_given(kinematics):
     mesh = run.mesh
     T, dx = run.temperature(), ufl.Measure("dx", mesh.domain, subdomain_data=mesh.cells)
     R = ufl.SpatialCoordinate(mesh.domain)[0]
-    stored = sum(fem.assemble_scalar(fem.form(c * (T - 25) * weight(R) * dx(mesh.layers[name])))
+    stored = sum(fem.assemble_scalar(_compat.compile_form(c * (T - 25) * weight(R) * dx(mesh.layers[name])))
                  for name, c in (("core", 1050 * 1800.0), ("skin", 900 * 2100.0)))
     assert run.heat_stored.sum() == pytest.approx(stored, rel=1e-9)
 

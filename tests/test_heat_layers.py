@@ -10,6 +10,7 @@ from conftest import run_json
 from dolfinx import fem
 
 import formingx as fx
+from formingx import _compat
 from formingx.exact import heat as reference
 from formingx.extensions.heat import checks
 from formingx.extensions.heat import run as running
@@ -86,7 +87,8 @@ def test_layers_are_the_same_body(name):
     fine.check()
     for m in (mesh, fine):
         assert set(m.boundaries) == set(mesh.boundaries)
-    sizes = [[fem.assemble_scalar(fem.form(fem.Constant(m.domain, 1.0) * measure(tags))) for measure, names in
+    sizes = [[fem.assemble_scalar(_compat.compile_form(fem.Constant(m.domain, 1.0) * measure(tags)))
+              for measure, names in
               ((ufl.Measure("dx", m.domain, subdomain_data=m.cells), m.layers),
                (ufl.Measure("ds", m.domain, subdomain_data=m.facets), m.boundaries)) for tags in names.values()]
              for m in (mesh, fine)]

@@ -8,6 +8,7 @@ from test_files import steps_of
 from test_restart import same
 
 import formingx as fx
+from formingx import _compat
 
 
 def block(friction, contact=fx.Contact, elements=(4, 4)):
@@ -425,7 +426,7 @@ def test_mean_stress_is_conserved_by_the_transfer(monkeypatch):
 
     def mean(forms):
         value = ufl.inner(forms.F, forms.F) * forms.weight * ufl.dx(forms.domain, degree=8)
-        return fem.assemble_scalar(fem.form(value))
+        return fem.assemble_scalar(_compat.compile_form(value))
     for travel, n, force, energy in ((0.2, 8, 5e-3, 4e-3), (0.5, 8, 4e-3, 2e-3)):
         path, state = remeshed_at(monkeypatch, travel, n)
         old, new = path.record.segments[0], path.record.segments[1].problem

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 import ufl
-from dolfinx import fem, mesh
+from dolfinx import mesh
 from mpi4py import MPI
 
 import formingx as fx
+from formingx import _compat
 from formingx.values.table import table
 from formingx.values.temperature import WLF, Arrhenius
 
@@ -19,7 +20,7 @@ def at_points(expression, low, high, n=61):
     s = np.linspace(0, 1, n)
     x = ufl.variable(ufl.SpatialCoordinate(line)[0])
     f = expression(x)
-    both = fem.Expression(ufl.as_vector([f, ufl.diff(f, x)]), s[:, None])
+    both = _compat.compile_expression(ufl.as_vector([f, ufl.diff(f, x)]), s[:, None])
     values = both.eval(line, np.array([0], dtype=np.int32)).reshape(n, 2)
     return low + (high - low) * s, values[:, 0], values[:, 1]
 

@@ -9,6 +9,7 @@ import ufl
 from dolfinx import fem, mesh
 from mpi4py import MPI
 
+from formingx import _compat
 from formingx.forms.temperature_coefficient import TemperatureCoefficient
 
 LAWS = (lambda T: np.exp(T), lambda T: np.exp(-2 * T))     # ln f is linear in T: the extrapolation is exact
@@ -28,7 +29,7 @@ def test_values_at_earlier_temperatures_are_used_again_with_their_rates_only():
     values = fem.Function(fem.functionspace(domain, basix.ufl.quadrature_element("triangle", degree=1)))
     parts = [(np.array([cell]), counted(law)) for cell, law in enumerate(LAWS)]
     coefficient, t = TemperatureCoefficient(forms, values, parts, [A[None], B[None]]), fem.Constant(domain, 0.0)
-    integral = fem.form(coefficient.at_time(t) * ufl.dx(metadata={"quadrature_degree": 1}))
+    integral = _compat.compile_form(coefficient.at_time(t) * ufl.dx(metadata={"quadrature_degree": 1}))
     states = [((A, B), None, 0.0, 0.0), ((B, A), (A, B), 1.0, 0.0), ((A, B), None, 0.0, 0.0),
               ((B, A), (A, B), 1.0, 0.0), ((B, A), (A, B), 1.5, 0.0), ((B, A), (A, B), 1.5, 1.0),
               ((B, B), (A, B), 1.5, 1.0), ((B, B), (B, A), 1.5, 1.0), ((B, A), (A, B), 1.0, 0.0)]
