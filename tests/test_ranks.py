@@ -57,7 +57,7 @@ import sys, json
 sys.path.insert(0, "tests")
 from test_contact import cup, form
 found = []
-for friction in ("none", "stick", 0.3):
+for friction in {frictions}:
     path = form(cup(friction), 8.0)
     found += [path.counts.steps, path.counts.iterations, float(path.profile().thickness_ratio.min())]
     found += [path.last.measures[k] for k in ("pole_height", "tool_force", "contact_length")]
@@ -66,9 +66,10 @@ if path.problem.comm.rank == 0:
 """
 
 
-@pytest.mark.parametrize("ranks", [2, pytest.param(3, marks=pytest.mark.thorough)])
-def test_ranks_agree_on_contact(ranks):
-    serial, other = (run_json(CONTACT, n) for n in (1, ranks))
+@pytest.mark.parametrize("ranks, frictions", [(2, [0.3]), *(pytest.param(*row, marks=pytest.mark.thorough) for row in (
+    (2, ["none", "stick"]), (3, ["none", "stick", 0.3])))])
+def test_ranks_agree_on_contact(ranks, frictions):
+    serial, other = (run_json(CONTACT.format(frictions=frictions), n) for n in (1, ranks))
     assert other == pytest.approx(serial, rel=1e-8)
 
 
