@@ -65,6 +65,13 @@ def wall_area(wall, z):
     return float(np.sum(np.diff(found["arc_length"]) * (h[1:] + h[:-1]) / 2))
 
 
+def without_border(picture):
+    """Return a picture, shape (rows, columns, channels), without its white border."""
+    ink = (picture[..., :3] < 0.98).any(2)
+    rows, columns = np.flatnonzero(ink.any(1)), np.flatnonzero(ink.any(0))
+    return picture[rows[0]: rows[-1] + 1, columns[0]: columns[-1] + 1]
+
+
 def draw_states(path, states, file, grid=None, curves=None):
     """Draw the whole body in some states side by side, with the wall over the original one.
 
@@ -85,7 +92,7 @@ def draw_states(path, states, file, grid=None, curves=None):
             if curves:
                 curves(axes[0])
             for axis, title, picture in zip(axes[bool(curves):], states, pictures):
-                axis.imshow(imread(picture))
+                axis.imshow(without_border(imread(picture)))
                 axis.set_title(title)
                 axis.axis("off")
             save(figure, file)

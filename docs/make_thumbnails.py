@@ -17,7 +17,8 @@ PICTURES, THUMBNAILS = DOCS.parent / "demos" / "pictures", DOCS / "thumbnails"
 WIDTH, COLOURS, MARGIN = 480, 96, 6                            # pixels, colours, pixels
 PANELS = {
     "balloon": (0, 0, 1 / 3, 1), "bottle_3_to_1": (0, 0, 0.31, 1), "chilling": (0.5, 0, 1, 0.5),
-    "clamp_ring": (0.64, 0, 1, 1), "cold_plug": (0.635, 0, 1, 1), "compression_grids": (0, 0.725, 1, 1),
+    "clamp_ring": (0.64, 0, 1, 1), "closing_halves": (0, 0, 1, 1),
+    "cold_plug": (0.635, 0, 1, 1), "compression_grids": (0, 0.725, 1, 1),
     "contact_convergence": (0.667, 0, 1, 1), "cup_adapted": (0, 0, 0.5, 1), "even_bottle": (0, 0, 0.5, 1),
     "even_disc": (0, 0, 0.5, 1), "even_pot": (0, 0, 0.5, 1), "even_trough": (0, 0, 0.5, 1),
     "fit_treloar": (0, 0.04, 0.325, 0.79), "heated_disc": (1 / 3, 0, 0.655, 1), "heating": (2 / 3, 0.485, 1, 1),

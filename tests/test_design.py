@@ -1,5 +1,7 @@
 """Derivatives of runs by parameters of their script, and optimisation with them."""
 
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
@@ -41,6 +43,31 @@ def test_derivatives_are_those_of_whole_runs():
     assert run.derivative(pole_wall)[1][0] == pytest.approx(run.derivative("wall")[1][0], rel=1e-12)
     volume, by = run.derivative("volume")
     assert volume == pytest.approx(np.pi * 0.05, rel=1e-9) and by[0] == pytest.approx([0, np.pi, 0], abs=1e-8)
+
+
+def test_differences_of_whole_runs_are_the_derivatives():
+    """Also of a measure of earlier states, at a bound, and in an executor; a run that fails is named."""
+    ranges = {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.05), "height": (0.6, 0.1, 1.0)}
+    exact = fx.Design(disc, ranges).run()
+    with ThreadPoolExecutor(1) as one:
+        design = fx.Design(disc, ranges, derivatives="runs", executor=one)
+        run = design.run()
+        for measure in ("wall", "pressure", "volume"):
+            assert run.derivative(measure)[1] == pytest.approx(exact.derivative(measure)[1], rel=0.05, abs=2e-4)
+        assert design.whole_runs.count == 3
+        assert run.derivative(highest_pressure)[1].shape == (1, 3) and design.whole_runs.count == 6
+        assert design.whole_runs.since(0)[1] == "6 for differences of whole runs, by the executor"
+        answer = design.fit(even=True, start=run, max_runs=9)
+    assert answer.cv[1] < answer.cv[0] and answer.paths <= 9 and answer.difference_runs > 0
+    with pytest.raises(fx.InputError, match=r"no derivative by height: the run at 0.78, next to 0.6, fails: .*a=10"):
+        fx.Design(lambda height: disc(height=height if height < 0.65 else fail("a=10")), {"height": (0.6, 0, 9)},
+                  derivatives="runs").run().derivative("wall")
+    with pytest.raises(fx.InputError, match=r"Design: derivatives 'difference' is not known; known: 'exact', 'runs'"):
+        fx.Design(disc, ranges, derivatives="difference")
+
+
+def fail(text):
+    raise fx.InputError(text)
 
 
 def heated(heater):

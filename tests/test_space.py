@@ -581,8 +581,6 @@ def test_moulds_from_files_fill(make, tmp_path):
                       supports=[fx.Symmetry("axis"), fx.Symmetry("rim", "y")]), "a section has no component 'y'"),
     (lambda: disc(contacts=[fx.Contact("bottom", fx.tools.plane(1.0))]), "a sheet in three dimensions takes"),
     (lambda: disc(material=MATERIALS[3], contacts=[plug_above(True)]), "three dimensions that relaxes sticks"),
-    (lambda: fx.Design(lambda h: (disc(thickness=h), fx.pressure(0.001)), {"h": (0.01, 0.005, 0.02)}).fit(even=True),
-     "in three dimensions has no section"),
     (lambda: fx.trace(disc(), until=fx.pole_height(0.1), progress=False), r"take displacement\(..., at="),
     (lambda: fx.tools.box(half=(1.0, 1.0), depth=1.0, lip=0.1, plug=True), "lip = 0.1: a plug has no flange"),
     (lambda: fx.mesh.sheet([(0, 0), (1, 1), (1, 0), (0, 1)], 0.1), r"crosses or touches itself near \(0.5, 0.5\)"),

@@ -258,17 +258,42 @@ def test_measured_wall_of_a_bottle(tmp_path):
         fx.MeasuredWall(wall=[1.0], length=[3.0]).compare(path)
 
 
-def test_a_design_of_a_tube_names_the_search_that_works():
-    tool = fx.tools.revolved(fx.tools.bottle(radius=20.0, height=70.0, neck=18.0, shoulder=10.0, neck_height=15.0,
-                                             base=-105.0, fillet=4.0, shoulder_fillet=4.0))
-    design = fx.Design(lambda wall: (scene(thickness=wall, contacts=[fx.Contact("outer", tool, "stick")]),
-                                     fx.enclosed_volume(2e4)), {"wall": (0.5, 0.3, 0.8)})
+ROUND_MOULD = fx.tools.revolved(fx.tools.bottle(radius=20.0, height=70.0, neck=18.0, shoulder=10.0, neck_height=15.0,
+                                                base=-105.0, fillet=4.0, shoulder_fillet=4.0))
+
+
+def moulded(wall):
+    """A tube whose thickness is a function of the part of its meridian, blown into a round mould to a volume."""
+    mesh = fx.mesh.tube(**CAPPED | {"elements": (8, 3)})
+    length = float(mesh.arc_length([0.0], [0.0], [-100.0])[0])
+    return scene(mesh, thickness=lambda x, y, z: wall(mesh.arc_length(x, y, z) / length),
+                 contacts=[fx.Contact("outer", ROUND_MOULD, "stick")]), fx.enclosed_volume(3e4)
+
+
+def test_a_design_of_a_tube_takes_differences_of_whole_runs():
+    """The walls at twice the thickness are twice the walls: the knots together have the derivative wall / thickness."""
+    design = fx.Design(moulded, {"wall": fx.spline(2, start=0.5, low=0.3, high=0.8)})
     run = design.run()
-    assert run.path.part().min_wall > 0.2
-    with pytest.raises(fx.InputError, match=r"no derivative of contact in three dimensions yet; fx.wall_programme"):
-        run.derivative("volume")
-    with pytest.raises(fx.InputError, match=r"has no section.* fx.wall_programme finds the thickness"):
-        design.minimum_weight(min_wall=0.3)
+    wall, slopes = run.derivative("wall")
+    assert design.whole_runs.count == 2 and run.missing_runs == 0
+    assert np.linalg.norm(slopes.sum(1) - wall / 0.5) < 0.02 * np.linalg.norm(wall / 0.5)
+    first = run.reference_length < 40
+    assert np.abs(slopes[first, 0]).mean() > 2 * np.abs(slopes[first, 1]).mean()
+    volume, by = run.derivative("volume")
+    assert by.sum() == pytest.approx(volume[0] / 0.5, rel=1e-9) and design.whole_runs.count == 2
+    assert run.sensitivities().coordinates == pytest.approx(np.sort(run.reference_length))
+    with pytest.raises(fx.InputError, match=r"no exact derivatives; Design\(derivatives='runs'\) takes differences"):
+        fx.Design(moulded, {"wall": fx.spline(2, start=0.5)}, derivatives="exact").run().derivative("volume")
+
+
+@pytest.mark.thorough
+def test_a_design_of_a_tube_meets_a_minimum_wall(tmp_path):
+    design = fx.Design(moulded, {"wall": fx.spline(3, start=0.5, low=0.2, high=0.8)}, workers=2)
+    found = design.minimum_weight(min_wall=0.25)
+    assert found.best.wall.min() == pytest.approx(0.25, rel=0.02) and not found.missed and found.paths <= 60
+    assert found.best.volume < found.before.volume and found.difference_runs == design.whole_runs.count
+    assert f"{found.difference_runs} for differences of whole runs, 2 at a time" in str(found)
+    assert "minimum wall" in found.report(tmp_path / "design.html").read_text()
 
 
 def test_temperature_and_constants_may_depend_on_the_height():

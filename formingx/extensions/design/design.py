@@ -6,11 +6,12 @@ import copy
 import inspect
 import logging
 from collections.abc import Callable, Mapping, Sequence
+from concurrent import futures
 from typing import Any
 
 import numpy as np
 
-from ...errors import ConvergenceError, InputError, check_type, count, positive
+from ...errors import ConvergenceError, InputError, check_name, check_type, count, positive
 from ...measures.targets import Target
 from ...runs import Process, trace
 from ...scene.scene import Scene
@@ -22,8 +23,12 @@ from .objective import SETTINGS, MeasuredWallObjective, WallObjective, mask_of_r
 from .parameters import Parameters
 from .result import DesignResult
 from .run import DesignRun
+from .whole_runs import WholeRuns
 
 log = logging.getLogger("formingx")
+
+_MOST_WHOLE_RUNS = 60
+"""Default of the largest number of runs of a search whose derivatives are differences of whole runs."""
 
 
 class Design:
@@ -39,10 +44,17 @@ class Design:
         step: control of the step length of each run, as in `trace`.
         tolerances: tolerances of each run, as in `trace`.
         max_steps: maximum number of steps of each run, as in `trace`.
+        derivatives: "exact" for derivatives by the tangents of the run, "runs" for differences of whole runs, each with
+            one parameter changed by 2 % of its range. Default: "runs" with contact in three dimensions, which
+            has no exact ones, and else "exact".
+        workers: number of parallel processes for these differences; 1: one run after the other in this process. Other
+            processes import `build`: no lambda, no function inside another.
+        executor: executor of `concurrent.futures` for these differences; default: processes of this machine.
 
     Attributes:
         parameters: the `Parameters` of the design.
-        paths: number of runs so far.
+        paths: number of runs so far in this process.
+        whole_runs: runs for differences; its `count` is their number.
 
     Raises:
         InputError: `build` is no function of these parameters, or a parameter has wrong values or bounds.
@@ -57,7 +69,8 @@ class Design:
     """
 
     def __init__(self, build: Callable[..., Any], parameters: Mapping[str, Any], *, step: StepControl | None = None,
-                 tolerances: Tolerances | None = None, max_steps: int | None = None):
+                 tolerances: Tolerances | None = None, max_steps: int | None = None, derivatives: str | None = None,
+                 workers: int = 1, executor: futures.Executor | None = None):
         if not callable(build):
             raise InputError(f"Design: build = {build!r}: must be a function of the parameters that returns a scene and"
                              f" its target or stages")
@@ -68,7 +81,15 @@ class Design:
             raise InputError(f"Design: parameters {', '.join(map(repr, parameters))}: build{inspect.signature(build)}"
                              f" cannot be called with these: {error}") from None
         self._step, self._tolerances, self._max_steps = step, tolerances, max_steps
+        if derivatives is not None:
+            check_name("Design: derivatives", derivatives, ("exact", "runs"))
+        self._derivatives = derivatives
+        self.whole_runs: WholeRuns = WholeRuns(count("Design: workers", workers), executor)
         self.paths = 0                                       # number of runs so far
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the design for another process, which makes no differences of its own."""
+        return vars(self) | {"whole_runs": None}
 
     def run(self, values: Mapping[str, Any] | None = None) -> DesignRun:
         """Compute the run for given values of the parameters.
@@ -102,15 +123,17 @@ class Design:
         """Compute the run for values of the parameters, those of a profile at its knots, shape (n,)."""
         scene, end = self._make(vector)
         scene = copy.copy(scene)                             # the scene of the script does not change
-        scene.one_node_per_step = True
+        lagged = any(contact.lagged for contact in scene.contacts)
+        scene.one_node_per_step = not lagged                 # exact derivatives of gap closures need it
         self.paths += 1
         options: dict[str, Any] = {"step": self._step, "tolerances": self._tolerances, "max_steps": self._max_steps,
                                    "progress": False}
         path = trace(scene, until=end, **options) if isinstance(end, Target) else Process(scene).run(end, **options)
-        return DesignRun(self._make, self.parameters, vector, path, end, self._tolerances)
+        by_runs = self._derivatives == "runs" or self._derivatives is None and lagged
+        return DesignRun(self._make, self.parameters, vector, path, end, self._tolerances, self if by_runs else None)
 
     def fit(self, *, wall: Any = None, even: bool = False, within: tuple[float, float] | None = None,
-            volume: str | float | None = "kept", max_runs: int = 10, min_change: float = 1e-4,
+            volume: str | float | None = "kept", max_runs: int | None = None, min_change: float = 1e-4,
             start: Mapping[str, Any] | DesignRun | None = None) -> DesignResult:
         """Search for the parameters that give an even, a wanted or a measured wall thickness.
 
@@ -124,7 +147,7 @@ class Design:
             within: lowest and highest reference length of the nodes that count, length; default all.
             volume: "kept": the reference volume of the first run is prescribed, but free with a measured wall.
                 A number prescribes the reference volume, length^3; None leaves it free.
-            max_runs: maximum number of runs.
+            max_runs: maximum number of runs; default 10, or 60 with those for differences of whole runs.
             min_change: the search ends if the predicted relative change of the wall (root mean square) is smaller.
             start: {parameter: start value}, or a run of this design.
 
@@ -139,7 +162,8 @@ class Design:
             raise InputError("fit: nothing to fit: give it wall=..., a wanted thickness, or even=True")
         if even and wall is not None:
             raise InputError("fit: wall and even=True are both given: must be one of them")
-        max_runs, min_change = count("fit: max_runs", max_runs), positive("fit: min_change", min_change)
+        most = None if max_runs is None else count("fit: max_runs", max_runs)
+        min_change = positive("fit: min_change", min_change)
         if isinstance(volume, str) and volume != "kept" or isinstance(volume, bool):
             raise InputError(f"fit: volume = {volume!r}: must be 'kept', a number or None")
         first = start if isinstance(start, DesignRun) else self._run(self.parameters.vector(start or {}))
@@ -150,7 +174,8 @@ class Design:
             first.volume * (1 - SETTINGS.volume_margin) if volume == "kept" else positive("fit: volume", volume))
         objective = (MeasuredWallObjective(first, wall, prescribed) if measured
                      else WallObjective(first, wall, within, prescribed))
-        return self._search(first, objective, max_runs, min_change)
+        most = most or (_MOST_WHOLE_RUNS if first.missing_runs else 10)
+        return self._search(first, objective, most, min_change)
 
     def _search(self, first: DesignRun, objective: WallObjective, max_runs: int, min_change: float) -> DesignResult:
         """Search with Gauss-Newton steps from the best run, which are halved if a run is worse or fails.
@@ -161,8 +186,13 @@ class Design:
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         best, runs, predicted, gained_before = first, [first], first.wall, 1.0
         failed: list[str] = []
+        before = self.whole_runs.count
+
+        def left() -> int:
+            """Return the number of runs that the search may still take."""
+            return max_runs - len(runs) - len(failed) - (self.whole_runs.count - before)
         reason = f"max_runs = {max_runs} were used up"
-        while len(runs) + len(failed) < max_runs:
+        while left() > best.missing_runs:
             try:
                 residual, jacobian = objective.residual(best)
             except InputError as error:
@@ -183,7 +213,7 @@ class Design:
                     f"the next step, within the bounds, would be {100 * max(improvement, 0.0):.1f} % better")
                 break
             share, new = 1.0, None
-            while share >= SETTINGS.shortest_step and len(runs) + len(failed) < max_runs:
+            while share >= SETTINGS.shortest_step and left() > 0:
                 try:
                     new = self._run(np.clip(best.vector + share * step, low, high))
                     runs.append(new)
@@ -206,10 +236,11 @@ class Design:
             log.info("design: run %d, cost %.3g", len(runs), objective.cost(best))
         missed = [missed_target("volume", objective.volume, best.volume), objective.shortfall(best)]
         return DesignResult(first, best, runs, failed, objective.inside, reason, predicted,
-                            "\n".join(filter(None, missed)), objective.target_wall, objective.measured)
+                            "\n".join(filter(None, missed)), objective.target_wall, objective.measured,
+                            *self.whole_runs.since(before))
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None,
-                       max_runs: int = 15) -> DesignResult:
+                       max_runs: int | None = None) -> DesignResult:
         """Search for the smallest reference volume whose wall thickness is nowhere below a minimum.
 
         Successive linear programs minimise the linearised volume within a trust region, which shrinks if a run is worse
@@ -220,7 +251,7 @@ class Design:
             min_wall: minimum wall thickness, length.
             within: lowest and highest reference length (distance from the axis along the undeformed middle line) of
                 the nodes that count, length; default all.
-            max_runs: maximum number of runs.
+            max_runs: maximum number of runs; default 15, or 60 with those for differences of whole runs.
 
         Returns:
             First and best run of the search, and the reason for its end.
@@ -230,19 +261,22 @@ class Design:
             ConvergenceError: the first run fails.
         """
         from scipy.optimize import linprog
-        min_wall, max_runs = positive("minimum_weight: min_wall", min_wall), count("minimum_weight: max_runs", max_runs)
+        min_wall = positive("minimum_weight: min_wall", min_wall)
+        most = None if max_runs is None else count("minimum_weight: max_runs", max_runs)
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         first = self._run(self.parameters.start.copy())
         inside = mask_of_range(first, within)
         unit = min(min_wall, first.wall[inside].min())
         best, runs, predicted, trust_radius = first, [first], first.wall, 0.25
         failed: list[str] = []
-        reason = f"max_runs = {max_runs} were used up"
+        before = self.whole_runs.count
+        most = most or (_MOST_WHOLE_RUNS if first.missing_runs else 15)
+        reason = f"max_runs = {most} were used up"
 
         def cost(run: DesignRun) -> float:
             """Return the volume of a run over the first run's, plus a penalty for a wall below the minimum."""
             return run.volume / first.volume + 10 * max(min_wall - run.wall[inside].min(), 0.0) / unit
-        while len(runs) + len(failed) < max_runs:
+        while most - len(runs) - len(failed) - (self.whole_runs.count - before) > best.missing_runs:
             try:
                 wall, jacobian = best.derivative("wall")
             except InputError as error:
@@ -280,4 +314,5 @@ class Design:
                 break
         thinnest = best.wall[inside].min()
         return DesignResult(first, best, runs, failed, inside, reason, predicted,
-                            missed_target("minimum wall", min_wall, min(thinnest, min_wall)))
+                            missed_target("minimum wall", min_wall, min(thinnest, min_wall)),
+                            None, None, *self.whole_runs.since(before))

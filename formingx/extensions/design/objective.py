@@ -70,7 +70,7 @@ class WallObjective:
         self.inside, self.volume = mask_of_range(run, within), volume
         self.target_wall: np.ndarray | None = None
         if wall is not None:
-            s = run.profile.reference_length[self.inside]
+            s = run.reference_length[self.inside]
             self.target_wall = (values("fit: wall", wall, {"reference length": s}) if callable(wall)
                            else np.full(len(s), finite("fit: wall", wall)))
             if not np.all(self.target_wall > 0):
@@ -124,7 +124,7 @@ class WallObjective:
         worst = int(np.argmax(np.abs(deviation)))
         if abs(deviation[worst]) < MEASURED_ACCURACY:
             return ""
-        s = run.profile.reference_length[self.inside]
+        s = run.reference_length[self.inside]
         return (f"the wanted wall was not reached: wanted {_range(self.target_wall)}, reached {_range(wall)}; the"
                 f" largest deviation is {100 * deviation[worst]:+.3g} %, at reference length {s[worst]:.4g}."
                 f" {self._limits(run)}.")
@@ -200,7 +200,7 @@ def mask_of_range(run: DesignRun, within: tuple[float, float] | None) -> np.ndar
 
     With None all nodes count; fewer than two nodes are an InputError.
     """
-    s = run.profile.reference_length
+    s = run.reference_length
     if within is None:
         return np.ones(len(s), dtype=bool)
     low, high = pair("within", within)

@@ -49,7 +49,8 @@ class _PerturbedPaths:
         if path.ended:
             raise Failure(path.ended, [])
         if any(face.contact.lagged for face in path.problem.contacts):
-            raise Failure("there is no derivative of contact in three dimensions yet; fx.wall_programme needs none", [])
+            raise Failure("contact in three dimensions has no exact derivatives; Design(derivatives='runs') takes"
+                          " differences", [])
         self.path, self.runs = path, perturbed
         self.problem, self.curve = path.problem, path.record.curve
         self._single = isinstance(end, Target)

@@ -51,7 +51,7 @@ def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units)
     runs = page.table(["run", "unevenness", units.label("wall", "minimum wall"), units.label("wall", "mean wall"),
                        units.label("volume")], rows)
 
-    pictures = {"the picture of the part": lambda: _sections([before, best], ["before", "after"], units),
+    pictures = _parts([before, best], ["before", "after"], units) | {
                 "the picture of the walls": lambda: _walls(result, spread, deviations, units),
                 "the picture of the profiles": lambda: _profiles(before, best),
                 "the picture of the effects": lambda: _heat_map(effects, units)}
@@ -79,7 +79,7 @@ def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> Fi
         _line(axes, run, "C0", "wall", spread, deviations, units)
         return page.figure(drawing, "Wall over the reference length.")
 
-    pictures = {"the picture of the part": lambda: _sections([run], ["the part"], units),
+    pictures = _parts([run], ["the part"], units) | {
                 "the picture of the wall": wall_over_length,
                 "the picture of the effects": lambda: _heat_map(effects, units)}
     return _write(file, title or "Report of a run", ["One run and what changes it."], cards, notes, pictures,
@@ -118,6 +118,11 @@ def _write(file: Any, title: str, summary: list[str], cards: list, notes: list, 
     return FilePath(file)
 
 
+def _parts(runs: list[Any], names: list[str], units: Units) -> dict[str, Callable[[], str]]:
+    """Return {name: function that draws the sections}; {} for parts in three dimensions, which `Path.view3d` draws."""
+    return {} if runs[0].in_space else {"the picture of the part": lambda: _sections(runs, names, units)}
+
+
 def _sections(runs: list[Any], names: list[str], units: Units) -> str:
     """Return an HTML figure of the sections of several runs side by side, coloured by the wall thickness.
 
@@ -148,8 +153,8 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
 
     `spread` is the deviation at the k nodes, shape (k,), length; None for no band. `deviations` name the band.
     """
-    s = run.profile.reference_length
-    axes.plot(s, run.wall, color=colour, label=label)
+    s = run.reference_length
+    axes.plot(s, run.wall, "." if run.in_space else "-", color=colour, label=label)
     if spread is not None:
         sizes = np.sqrt(np.diag(covariance_of("report", run.parameters, deviations)))
         parameters = ", ".join(f"{name} ± {size:.3g}" for name, size in zip(run.parameters.names, sizes) if size)
@@ -165,9 +170,10 @@ def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
     `spread` is the standard deviation of the best wall at the k nodes, shape (k,), length; None for no band.
     """
     drawing, axes = figure(1, width=9, height=4)
-    s = result.best.profile.reference_length
-    axes.plot(s, result.before.wall, color="0.6", label="before")
-    axes.plot(s, result.predicted, "--", color="C1", linewidth=1, label="predicted by the run before the best")
+    s = result.best.reference_length
+    line, dashed = (".", ".") if result.best.in_space else ("-", "--")
+    axes.plot(s, result.before.wall, line, color="0.6", label="before")
+    axes.plot(s, result.predicted, dashed, color="C1", linewidth=1, label="predicted by the run before the best")
     if result.target_wall is not None:
         axes.plot(s[result.inside], result.target_wall, "k--", linewidth=1, label="wanted")
     if not np.all(result.inside):

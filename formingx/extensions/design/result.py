@@ -26,7 +26,7 @@ def unevenness(wall: np.ndarray) -> float:
 class DesignResult:
     """Result of a search for design parameters (`Design.fit`, `Design.minimum_weight`); its text is a report.
 
-    Walls are thicknesses at the k nodes of the bottom face.
+    Walls are thicknesses at the k nodes of the bottom face; in three dimensions at the k triangles.
 
     Attributes:
         before: the first `DesignRun` of the search.
@@ -39,6 +39,8 @@ class DesignResult:
         missed: text that names the missed targets (volume, wall or minimum wall) and the reason; "" if all were met.
         target_wall: wanted wall at the m nodes that count, shape (m,), length; None if no wall was wanted.
         measured: the `MeasuredWall` of a fit, or None.
+        difference_runs: number of whole runs for derivatives by differences; 0 with exact derivatives.
+        differences: text on these runs, with their number at a time; "" with exact derivatives.
     """
 
     before: DesignRun
@@ -51,6 +53,8 @@ class DesignResult:
     missed: str = ""
     target_wall: np.ndarray | None = None
     measured: Any = None
+    difference_runs: int = 0
+    differences: str = ""
 
     @cached_property
     def confidence(self) -> Confidence:
@@ -70,8 +74,8 @@ class DesignResult:
 
     @property
     def paths(self) -> int:
-        """Number of runs that the search took, including the failed ones."""
-        return len(self.runs) + len(self.failed)
+        """Number of runs that the search took, including the failed ones and those for differences."""
+        return len(self.runs) + len(self.failed) + self.difference_runs
 
     @property
     def cv(self) -> tuple[float, float]:
@@ -123,8 +127,8 @@ class DesignResult:
     def __str__(self) -> str:
         (a, b), before, after = self.cv, self.before.wall[self.inside], self.best.wall[self.inside]
         deviation = abs(self.predicted - self.best.wall)[self.inside].max() / after.mean()
-        failed = f", of which {len(self.failed)} failed" * bool(self.failed)
-        lines = [f"{self.paths} runs{failed}; {self.reason}",
+        of_which = [f"{len(self.failed)} failed"] * bool(self.failed) + [self.differences] * bool(self.differences)
+        lines = [f"{self.paths} runs{', of which ' * bool(of_which)}{' and '.join(of_which)}; {self.reason}",
                  f"{'':24}{'before':>12}{'after':>12}",
                  f"{'unevenness (std/mean)':24}{a:12.4f}{b:12.4f}",
                  f"{'minimum wall':24}{before.min():12.5g}{after.min():12.5g}",
@@ -160,9 +164,9 @@ class DesignResult:
             from ...figures import figure
             axes = figure(width=7)[1]
         for run, label, colour in ((self.before, "before", "0.6"), (self.best, "after", "C0")):
-            axes.plot(run.profile.reference_length, run.wall, color=colour, label=label)
+            axes.plot(run.reference_length, run.wall, "." if run.in_space else "-", color=colour, label=label)
         if self.target_wall is not None:
-            s = self.best.profile.reference_length[self.inside]
+            s = self.best.reference_length[self.inside]
             axes.plot(s, self.target_wall, "k--", linewidth=1, label="wanted")
         if self.measured is not None:
             found = self.measured.compare(self.best.path)

@@ -24,6 +24,7 @@ from .parameters import Parameters
 from .perturbed_paths import trace_perturbed
 from .perturbed_runs import PerturbedRun, PerturbedRunFailure
 from .scatter import Band
+from .whole_runs import Outputs
 
 _CONTACT_CHANGE = 1e-8
 """Relative change of a parameter with contact, to one side; a tenth and a hundredth of it are tried next.
@@ -107,6 +108,7 @@ class DesignRun:
         path: the computed `Path`.
         end: target or stages of the run.
         tolerances: tolerances of the run; None for the defaults.
+        by_runs: the `Design` whose whole runs give the derivatives as differences; None for exact derivatives.
 
     Attributes:
         parameters: the `Parameters` of the design.
@@ -116,19 +118,45 @@ class DesignRun:
     """
 
     def __init__(self, make: Callable[[np.ndarray], tuple[Any, Any]], parameters: Parameters, vector: np.ndarray,
-                 path: Path, end: Any, tolerances: Tolerances | None):
+                 path: Path, end: Any, tolerances: Tolerances | None, by_runs: Any = None):
         self._make, self.parameters, self.vector, self.path, self._end = make, parameters, vector, path, end
         self._tolerances = tolerances or Tolerances()
         self.values = parameters.values(vector)
+        self._by_runs = by_runs
+        self._neighbours: list[tuple[Outputs, float]] = []    # outputs of runs at changed parameters, and the changes
 
     @cached_property
     def profile(self) -> Profile:
-        """Outline of the formed part in the last state of the run; `InputError` for a part in three dimensions."""
-        if self.path.scene.kinematics.components == 3:
-            raise InputError("Design: a part in three dimensions has no section, and its contact no derivatives yet:"
-                             " fx.wall_programme finds the thickness of a parison along its meridian for a minimum"
-                             " wall, and fx.study varies any numbers")
+        """Outline of the formed part in the last state of the run; a part in three dimensions has none."""
         return self.path.profile()
+
+    @property
+    def in_space(self) -> bool:
+        """True for a part in three dimensions."""
+        return bool(self.path.scene.kinematics.components == 3)
+
+    @cached_property
+    def _sheet_wall(self) -> Any:
+        """Wall of a part in three dimensions in the last state, a `SheetWall`."""
+        return self.path.wall()
+
+    @property
+    def missing_runs(self) -> int:
+        """Number of whole runs that the derivatives of this run still need; 0 for exact derivatives."""
+        return len(self.parameters) if self._by_runs is not None and not self._neighbours else 0
+
+    @cached_property
+    def reference_length(self) -> np.ndarray:
+        """Reference length of the k places of the wall, shape (k,), length.
+
+        In a section it is the distance of a node from the axis along the undeformed middle line. In three dimensions it
+        is that of the centroid of a triangle: along the meridian from the neck of a tube, else from the axis.
+        """
+        if not self.in_space:
+            return self.profile.reference_length
+        wall, mesh = self._sheet_wall, self.path.scene.mesh
+        X = wall.reference_points[wall.triangles].mean(1)
+        return np.hypot(X[:, 0], X[:, 1]) if mesh.meridian is None else mesh.arc_length(*X.T)
 
     @cached_property
     def _profiles(self) -> Profiles:
@@ -139,9 +167,10 @@ class DesignRun:
     def wall(self) -> np.ndarray:
         """Thickness at the k nodes of the bottom face in the last state, shape (k,), length.
 
-        It is the deformed distance to the opposite node of the top face.
+        It is the deformed distance to the opposite node of the top face. In three dimensions it is the thickness of the
+        k triangles.
         """
-        return self.profile.thickness
+        return self._sheet_wall.wall if self.in_space else self.profile.thickness
 
     @property
     def volume(self) -> float:
@@ -201,7 +230,14 @@ class DesignRun:
         Raises:
             InputError: the run has no derivative, or the quantity depends on earlier states.
         """
-        value, columns = self._value(measure), []
+        value, columns = self.value(measure), []
+        if self._by_runs is not None:
+            if not self._neighbours or measure not in self._neighbours[0][0]:
+                self._neighbours = self._by_runs.whole_runs.neighbours(self._by_runs, self.vector, measure)
+            moved = [(outputs[measure], step) for outputs, step in self._neighbours]
+            if any(np.shape(other) != np.shape(value) for other, _ in moved):
+                raise InputError("Design: no derivative: a parameter changes the number of places of the wall")
+            return value, np.stack([(other - value) / step for other, step in moved], axis=-1)
         for runs, difference in self._perturbed_runs:
             first, *other = (np.atleast_1d(self._perturbed_value(entry, measure)) for entry in runs)
             columns.append((first - (other[0] if other else value)) / difference)
@@ -222,7 +258,10 @@ class DesignRun:
             InputError: the run has no derivative, or the quantity depends on earlier states.
         """
         value, jacobian = self.derivative(measure)
-        coordinates = self.profile.reference_length if measure == "wall" else np.arange(float(len(value)))
+        coordinates = self.reference_length if measure == "wall" else np.arange(float(len(value)))
+        if measure == "wall" and self.in_space:
+            order = np.argsort(coordinates, kind="stable")
+            coordinates, value, jacobian = coordinates[order], value[order], jacobian[order]
         name = measure if isinstance(measure, str) else getattr(measure, "__name__", "measure")
         return Effects(name, self.parameters.names, self.parameters.size, coordinates, value, jacobian)
 
@@ -285,16 +324,24 @@ class DesignRun:
         from .report import of_run
         return of_run(self, file, title, deviations, units or NONE)
 
-    def _value(self, measure: Any) -> np.ndarray:
-        """Return the values of an output quantity in the last state of this run, shape (m,).
+    def value(self, measure: Any) -> np.ndarray:
+        """Return the values of an output quantity in the last state of this run.
 
-        It is "wall", "volume", a column or a function of a path; an InputError says if it depends on earlier states.
+        Args:
+            measure: the quantity: "wall", "volume", a column of the path, or a function of it.
+
+        Returns:
+            The values, shape (m,).
+
+        Raises:
+            InputError: a function that gives no finite numbers. Or the derivatives are exact, and the quantity depends
+                on earlier states.
         """
         if isinstance(measure, str):
             if measure in ("wall", "volume"):
                 return np.atleast_1d(getattr(self, measure))
             values = self.path[measure][-1:]
-            if measure in self._last_alone.columns:
+            if self._by_runs is None and measure in self._last_alone.columns:
                 self._check_last_alone(values, self._last_alone[measure], f"column {measure!r}")
             return values
         found = measure(self.path) if callable(measure) else None
@@ -305,7 +352,8 @@ class DesignRun:
         if not np.all(np.isfinite(values)):
             raise InputError(f"Design: measure {measure!r} is {found!r}: must be 'wall', 'volume', a column of the"
                              f" path, or a function of it that gives finite numbers")
-        self._check_last_alone(values, measure(self._last_alone), "function of the path")
+        if self._by_runs is None:
+            self._check_last_alone(values, measure(self._last_alone), "function of the path")
         return values
 
     @cached_property
@@ -326,13 +374,15 @@ class DesignRun:
         if measure == "volume":
             return _volume(perturbed.problem)
         state = perturbed.state(self.path.last)
-        if measure == "wall":
+        if measure == "wall" and not self.in_space:
             nodes, perturbed_nodes = (problem.scene.mesh.domain.geometry.x
                                       for problem in (self.path.problem, perturbed.problem))
             same_nodes = self.path.problem.comm.allreduce(np.array_equal(nodes, perturbed_nodes), MPI.LAND)
             return (self._profiles if same_nodes else Profiles(perturbed.problem)).evaluate(state).thickness
         if perturbed.path is None:
             perturbed.path = _path_of(state, Record(perturbed.problem, Curve(perturbed.problem, self._tolerances)))
+        if measure == "wall":
+            return perturbed.path.wall().wall
         return perturbed.path[measure] if isinstance(measure, str) else np.asarray(measure(perturbed.path), dtype=float)
 
 

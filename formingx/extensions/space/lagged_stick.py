@@ -100,6 +100,8 @@ class LaggedStick(ContactLaw):
         found: np.ndarray = np.where(free & ends, 1.0, np.inf)
         way = (b - a)[hit]
         for _ in range(_BISECTIONS):
+            if not np.any(high - low > ROUND_OFF):
+                break
             middle = (low + high) / 2
             inside = self.tool.signed_distance(a[hit] + middle[:, None] * way) > 0
             low, high = np.where(inside, low, middle), np.where(inside, middle, high)

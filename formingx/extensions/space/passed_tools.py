@@ -26,6 +26,9 @@ _MOST_COMPARED = 200       # of points on the wrong side, with all triangles
 _TOUCHING = 0.01           # distance of a node from the tool, over the median edge, up to which it touches
 _ADVANCES = 40             # of a corner of a triangle towards the tool, each as long as its distance from it
 _OFF_SURFACE = 0.5         # distance of a point from the tool's surface, over the spacing, above which it is hidden
+_POWERS = np.array([1 << 42, 1 << 21, 1])
+"""Factors that turn three numbers of cells below 2^21 into one number."""
+
 _MARGIN = 0.2              # of the points round the sheet, over its extent
 
 
@@ -75,9 +78,9 @@ class PassedTool:
     def deepest(self, fields: np.ndarray, control: float, limit: float, bridged_limit: float) -> PassedPoint | None:
         """Return the point of the tool with the largest ratio, or None; collective.
 
-        Points whose ratio `bridged` is below its limit come last; with the limit 0 none is. fields: owned unknowns,
-        shape (n,). A point is not examined if its distance from the nearest node, over the median edge, is below
-        `limit`.
+        Points whose ratio `bridged` is below its limit come last; with the limit 0 none is. It is found where the ratio
+        is above `limit`, and infinite elsewhere. fields: owned unknowns, shape (n,). A point is not examined if its
+        distance from the nearest node, over the median edge, is below `limit`.
         """
         face, x, sides = self._face, self._points, self._sides
         shift = face.tool_displacement(control)
@@ -87,10 +90,10 @@ class PassedTool:
             return None
         outside, met = sides.outside(x, P, shift[2])
         wrong = np.flatnonzero(met & (outside != self._faces_out))
-        if len(wrong) and len(sides.edge):                    # at its edge, the sheet is not continued
-            wrong = wrong[nearest(P[sides.edge], x[wrong])[0] > self._size]
         if len(wrong):
             wrong = wrong[nearest(P, x[wrong])[0] > limit * self._size]
+        if len(wrong) and len(sides.edge):                    # at its edge, the sheet is not continued
+            wrong = wrong[nearest(P[sides.edge], x[wrong])[0] > self._size]
         if not len(wrong):
             return None
         wrong = wrong[:: max(len(wrong) // _MOST_COMPARED, 1)]
@@ -98,9 +101,9 @@ class PassedTool:
         x = np.ascontiguousarray(x[wrong])
         _C.distances(len(x), x, len(self._cells), P, self._cells, depth, longest, triangle)
         ratio, bridged = depth / longest, np.full(len(x), np.inf)
-        if bridged_limit > 0:
-            travels = self._travels(x, P[self._cells[triangle]], bridged_limit * longest - depth)
-            bridged = (depth + travels) / longest
+        if bridged_limit > 0 and (far := np.flatnonzero(ratio > limit)).size:
+            travels = self._travels(x[far], P[self._cells[triangle[far]]], (bridged_limit * longest - depth)[far])
+            bridged[far] = (depth[far] + travels) / longest[far]
         k = np.lexsort((ratio, bridged >= bridged_limit))[-1]
         return PassedPoint(float(ratio[k]), float(depth[k]), x[k] + shift, float(bridged[k]))
 
@@ -152,7 +155,8 @@ def surface_points(tool: Any, spacing: float, nodes: np.ndarray, margin: float) 
         found.append((1 - share) * corners[rows, k - 1] + share * corners[rows, k])
     x = np.concatenate(found)
     x = x[((x[:, :2] >= low) & (x[:, :2] <= high)).all(1)]
-    x = x[np.unique(np.round(x / (spacing / 2)), axis=0, return_index=True)[1]]
+    cell = np.round((x - x.min(0, initial=np.inf)) / (spacing / 2)).astype(np.int64)
+    x = x[np.unique(cell @ _POWERS, return_index=True)[1]]
     near = tool.distances(x)
     on = np.abs(near.distance) < _OFF_SURFACE * spacing
     x = x[on] - (near.distance[:, None] * near.normal)[on]

@@ -172,7 +172,17 @@ class Swept(SolidTool):
 
     def _distance(self, x):
         """Return the signed distances from the unmoved tool, positive inside, shape (n,), length."""
-        return self.profile.signed_distance(np.column_stack([self._profile_coordinate(x)[0], x[:, 2]]))
+        if self.kind == "extruded":
+            r = x[:, "yx".index(self.along)]
+        else:
+            u, inner_half = np.abs(x[:, :2]) - self._inner_half, float(np.min(self._inner_half))
+            r = inner_half + np.hypot(*np.maximum(u, 0.0).T) + np.minimum(u.max(1), 0.0)
+        return self.profile.signed_distance(np.column_stack([r, x[:, 2]]))
+
+    @property
+    def _inner_half(self) -> np.ndarray:
+        """Half widths of the rectangle of the centres of its corners, shape (2,), length; 0 for a revolved tool."""
+        return np.array(self.half) - self.corner if self.kind == "box" else np.zeros(2)
 
     def _profile_coordinate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the coordinate r of points, shape (n, 3), in the plane (r, z) of the profile, shape (n,), length.
@@ -185,15 +195,13 @@ class Swept(SolidTool):
             axis = "yx".index(self.along)
             way[:, axis] = 1.0
             return x[:, axis], way, np.zeros(len(x))
-        half = np.array(self.half) - self.corner if self.kind == "box" else np.zeros(2)
-        sign, u = np.where(x[:, :2] < 0, -1.0, 1.0), np.abs(x[:, :2]) - half
-        inner_half = min(self.half) - self.corner if self.kind == "box" else 0.0
+        sign, u = np.where(x[:, :2] < 0, -1.0, 1.0), np.abs(x[:, :2]) - self._inner_half
         outside = np.hypot(*np.maximum(u, 0.0).T)
         flat = (u.min(1) < 0) | (outside == 0)
         way[:, :2] = sign * np.maximum(u, 0.0) / np.maximum(outside, 1e-300)[:, None]
         way[flat, :2] = (sign * (np.arange(2) == u.argmax(1)[:, None]))[flat]
         bend = np.where(flat, 0.0, 1 / np.maximum(outside, 1e-300))
-        return inner_half + outside + np.minimum(u.max(1), 0.0), way, bend
+        return self._inner_half.min() + outside + np.minimum(u.max(1), 0.0), way, bend
 
     @property
     def _size(self) -> float:
