@@ -135,7 +135,7 @@ def ball_of_triangles(file, radius):
 
 def main():
     options = parser("cad_tray", __doc__)
-    options.add_argument("--size", type=float, default=5.0, help="size of the triangles of the first mesh, mm")
+    options.add_argument("--size", type=float, default=4.0, help="size of the triangles of the first mesh, mm")
     options.add_argument("--adapted", type=int, default=4, help="largest number of meshes that are then adapted")
     args = options.parse_args()
     size, more, disc, share = (12.0, 0, 0.25, 0.1) if args.quick else (args.size, args.adapted, 0.05, 1.0)

@@ -212,6 +212,43 @@ def test_points_far_outside_are_outside_of_patches_that_fold(tmp_path):
     assert np.abs(smooth.signed_distance(x) - flat.signed_distance(x)).max() < 1.0
 
 
+def egg(seed, n, crease):
+    """A closed surface of long uneven triangles, dented, on which patches fold."""
+    from scipy.spatial import ConvexHull
+    points = np.random.default_rng(seed).normal(size=(n, 3))
+    points /= np.linalg.norm(points, axis=1)[:, None]
+    hull = ConvexHull(points)
+    a, b, c = (points[hull.simplices[:, k]] for k in range(3))
+    out = np.einsum("ni,ni->n", np.cross(b - a, c - a), a + b + c) > 0
+    triangles = np.where(out[:, None], hull.simplices, hull.simplices[:, ::-1])
+    return Triangulated(points * (1 + 0.3 * np.cos(5 * points[:, :1])), triangles, "egg", crease=crease)
+
+
+def test_points_far_inside_are_inside_of_patches_that_fold():
+    """Patches and flat triangles have the same sign farther from a surface than twice the largest bulge."""
+    x, found = np.random.default_rng(1).uniform(-1.4, 1.4, (20000, 3)), 0
+    for seed, n, crease in ((16, 80, 40.0), (14, 150, 40.0), (21, 250, 20.0)):
+        (surface,) = egg(seed, n, crease).surfaces
+        d, flat = surface.distance(x), surface._flat.distance(x)
+        far, folds = np.abs(d) > 2 * surface._bulges.max(), surface._folds[surface.nearest_triangles(x)]
+        assert not (far & (d * flat < 0)).any()
+        found += (far & folds).sum()
+    assert found > 0
+
+
+@pytest.mark.parametrize("depth, crosses", [(1.2, False), (1.9, True)])
+def test_surface_that_passes_through_itself_is_refused(depth, crosses, tmp_path):
+    """A ball whose lower part is pushed up into it: a dent, or through its upper part."""
+    points, triangles = ball(12)
+    points[points[:, 2] < -0.8] += [0.03, 0.01, depth]
+    write_stl(points, triangles, tmp_path / "dent.stl")
+    if crosses:
+        with pytest.raises(fx.InputError, match=r"'.*dent.stl' passes through itself at .* an edge by .* at \("):
+            fx.tools.solid(tmp_path / "dent.stl")
+    else:
+        assert fx.tools.solid(tmp_path / "dent.stl").triangles == len(triangles)
+
+
 @pytest.mark.parametrize("option, text", [
     ({"crease": -1}, "crease = -1.*0 to less than 90"), ({"crease": 100}, "crease = 100"),
     ({"scale": 0}, "scale"), ({"angle": 0}, "angle = 0"), ({"size": -1}, "size")])

@@ -138,7 +138,7 @@ class LaggedFriction(LaggedStick):
         moved = old.slip[rows] + positions[rows] - old.position[rows]
         along = np.einsum("ni,ni->n", n, moved)
         g = moved - along[:, None] * n
-        size, basis = np.linalg.norm(g, axis=1), _basis(n)
+        size, basis = np.sqrt(np.einsum("ni,ni->n", g, g)), _basis(n)
         mu = self._mu_at(rows)
         slides = (size > self.elastic_slip) & (mu > 0)
         if sense is not None:
@@ -216,8 +216,11 @@ class _Tractions(Tractions):
 
 def _basis(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return two orthogonal unit vectors in each tangent plane, shape (n, 3) each; normal: unit normals, shape (n, 3).
+
+    Source: Duff et al., Journal of Computer Graphics Techniques 6 (2017) 1.
     """
-    axis = np.eye(3)[np.abs(normal).argmin(1)]
-    first = np.cross(axis, normal)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return first, np.cross(normal, first)
+    x, y, z = normal.T
+    side = np.where(z < 0, -1.0, 1.0)
+    a = -1 / (side + z)
+    b = x * y * a
+    return (np.column_stack([1 + side * x * x * a, side * b, -side * x]), np.column_stack([b, side + y * y * a, -y]))

@@ -72,16 +72,11 @@ static void cross(const double *a, const double *b, double *c)
     c[0] = a[1] * b[2] - a[2] * b[1]; c[1] = a[2] * b[0] - a[0] * b[2]; c[2] = a[0] * b[1] - a[1] * b[0];
 }
 
-/* the point of the flat triangle of a patch at (u, v), with derivatives; returns the squared distance from x */
-static double on_flat(const double *P, const double *x, double u, double v, double S[6][3])
+/* the derivatives of the flat triangle of a patch */
+static void on_flat(const double *P, double S[6][3])
 {
-    double r[3];
-    memset(S, 0, 18 * sizeof(double));
-    for (int i = 0; i < 3; i++) {
-        S[0][i] = u * P[i] + v * P[12 + i] + (1 - u - v) * P[24 + i];
-        S[1][i] = P[i] - P[24 + i]; S[2][i] = P[12 + i] - P[24 + i];
-    }
-    return away(S[0], x, r);
+    memset(S + 1, 0, 15 * sizeof(double));
+    for (int i = 0; i < 3; i++) { S[1][i] = P[i] - P[24 + i]; S[2][i] = P[12 + i] - P[24 + i]; }
 }
 
 /* the step along an edge of the triangle that lowers the distance most; on: is (u, v) on the edges u, v, w = 0 */
@@ -99,8 +94,10 @@ static void along_an_edge(const int *on, const double *g, double A, double B, do
     *du = bu; *dv = bv;
 }
 
-/* the nearest point of a patch, by Newton's method from (u, v) in the triangle; returns the squared distance */
-static double project(const double *P, const double *x, double u, double v, double S[6][3], double *pu, double *pv)
+/* the nearest point of a patch, by Newton's method from (u, v) in the triangle; returns the squared distance. It ends
+   early if 4 times the decrease that Newton's method predicts would leave it above `best` */
+static double project(const double *P, const double *x, double best, double u, double v, double S[6][3], double *pu,
+                      double *pv)
 {
     double r[3], f;
     patch(P, u, v, S);
@@ -115,6 +112,7 @@ static double project(const double *P, const double *x, double u, double v, doub
         int on[3] = {u <= 0, v <= 0, w <= 1e-15};
         if ((on[0] && du < 0) || (on[1] && dv < 0) || (on[2] && du + dv > 0))
             along_an_edge(on, g, A, B, C, &du, &dv);
+        if (f + 4 * (g[0] * du + g[1] * dv) > best * (1 + 1e-9)) break;
         double most = 1;                                      /* stays in the triangle */
         if (du < 0 && u + most * du < 0) most = -u / du;
         if (dv < 0 && v + most * dv < 0) most = -v / dv;
@@ -190,61 +188,76 @@ static void sharp(double S[6][3], const double *uv, const double *n, const doubl
             H[3 * i + j] = ((i == j) - n[i] * n[j] - share * t[i] * t[j]) / d;
 }
 
+/* nearest patch of a point found so far: squared distance, squareness, number, (u, v), position with derivatives */
+typedef struct { double best, square; long found; double uv[2], S[6][3]; } candidate;
+
+/* Compare patch t. Of patches that are equally near, as at an edge, the one that meets the line to the point most
+   squarely counts: it gives the sign. */
+static void compare(candidate *near, const double *x, long t, const double *bulges, const double *patches)
+{
+    const double *P = patches + 3 * CONTROL_POINTS * t;
+    double u, v, S[6][3], N[3], r[3];
+    flat(P, P + 12, P + 24, x, &u, &v);
+    for (int i = 0; i < 3; i++) S[0][i] = u * P[i] + v * P[12 + i] + (1 - u - v) * P[24 + i];
+    double f = away(S[0], x, r), least = fmax(sqrt(f) - bulges[t], 0);    /* of the distance to the patch */
+    if (least * least > near->best * (1 + 1e-9)) return;
+    if (bulges[t] == 0) on_flat(P, S);
+    else f = project(P, x, near->best, u, v, S, &u, &v);
+    if (f > near->best * (1 + 1e-9)) return;
+    cross(S[1], S[2], N);
+    away(S[0], x, r);
+    double s = fabs(dot(r, N)) / sqrt(dot(N, N) * fmax(f, 1e-300));
+    if (f < near->best * (1 - 1e-9) || s > near->square) {
+        near->best = fmin(near->best, f);
+        near->square = s; near->found = t; near->uv[0] = u; near->uv[1] = v;
+        memcpy(near->S, S, sizeof near->S);
+    }
+}
+
 /* signed distance (positive inside), unit normal (into the tool), Hessian and nearest triangle of n points. bulges: the
-   largest distance of the control points of each patch from its flat triangle, 0 for a flat patch. Of patches that are
-   equally near, as at an edge, the one that meets the line to the point most squarely counts: it gives the sign. */
+   largest distance of the control points of each patch from its flat triangle, 0 for a flat patch. `triangle` comes with
+   a guess for each point, or -1: the search begins there. `edge` is 1 if the nearest point is on a sharp edge. */
 void nearest(long n, const double *X, const double *nodes, const long *links, const long *items, const double *boxes,
              const double *bulges, const double *patches, double *distance, double *normal, double *hessian,
-             long *triangle)
+             long *triangle, long *edge)
 {
     for (long k = 0; k < n; k++) {
         const double *x = X + 3 * k;
-        double best = 1e300, square = 0, uv[2] = {0, 0}, Sb[6][3];
-        long stack[ROOM], found = -1; int top = 0;
-        stack[top++] = 0;
-        while (top) {
-            long me = stack[--top];
-            if (to_box(nodes + 6 * me, x) > best * (1 + 1e-9)) continue;
+        candidate near = {1e300, 0, -1, {0, 0}, {{0}}};
+        long stack[ROOM], guess = triangle[k]; int top = 1;
+        double away_by[ROOM];                                 /* squared distances of the nodes on the stack */
+        if (guess >= 0) compare(&near, x, guess, bulges, patches);
+        stack[0] = 0; away_by[0] = to_box(nodes, x);
+        while (top--) {
+            long me = stack[top];
+            if (away_by[top] > near.best * (1 + 1e-9)) continue;
             if (links[2 * me] >= 0) {
                 long a = links[2 * me], b = links[2 * me + 1];
-                int other = to_box(nodes + 6 * a, x) < to_box(nodes + 6 * b, x);
-                stack[top++] = other ? b : a; stack[top++] = other ? a : b;
+                double p = to_box(nodes + 6 * a, x), q = to_box(nodes + 6 * b, x);
+                int other = p < q;                            /* the nearer one first */
+                stack[top] = other ? b : a; away_by[top++] = other ? q : p;
+                stack[top] = other ? a : b; away_by[top++] = other ? p : q;
                 continue;
             }
             long first = -1 - links[2 * me];
-            for (long j = first; j < first + links[2 * me + 1]; j++) {
-                long t = items[j];
-                if (to_box(boxes + 6 * t, x) > best * (1 + 1e-9)) continue;
-                const double *P = patches + 3 * CONTROL_POINTS * t;
-                double u, v, S[6][3], N[3], r[3];
-                flat(P, P + 12, P + 24, x, &u, &v);
-                double f = on_flat(P, x, u, v, S);
-                double least = fmax(sqrt(f) - bulges[t], 0);  /* of the distance to the patch */
-                if (least * least > best * (1 + 1e-9)) continue;
-                if (bulges[t] > 0) f = project(P, x, u, v, S, &u, &v);
-                if (f > best * (1 + 1e-9)) continue;
-                cross(S[1], S[2], N);
-                away(S[0], x, r);
-                double s = fabs(dot(r, N)) / sqrt(dot(N, N) * fmax(f, 1e-300));
-                if (f < best * (1 - 1e-9) || s > square) {
-                    if (f < best) best = f;
-                    square = s; found = t; uv[0] = u; uv[1] = v; memcpy(Sb, S, sizeof Sb);
-                }
-            }
+            for (long j = first; j < first + links[2 * me + 1]; j++)
+                if (items[j] != guess && to_box(boxes + 6 * items[j], x) <= near.best * (1 + 1e-9))
+                    compare(&near, x, items[j], bulges, patches);
         }
         double N[3], r[3];
-        cross(Sb[1], Sb[2], N);
+        cross(near.S[1], near.S[2], N);
         double size = sqrt(dot(N, N));
-        for (int i = 0; i < 3; i++) { N[i] /= size; r[i] = x[i] - Sb[0][i]; }
+        for (int i = 0; i < 3; i++) { N[i] /= size; r[i] = x[i] - near.S[0][i]; }
         double s = dot(r, N), d = sqrt(dot(r, r)), *n3 = normal + 3 * k, *H = hessian + 9 * k;
         distance[k] = d = s > 0 ? -d : d;
-        if (triangle) triangle[k] = found;
+        triangle[k] = near.found;
+        int crease = near.square < 1 - 1e-7 && fabs(d) > 1e-7 * sqrt(size);
+        edge[k] = crease;
         if (!normal) continue;
-        int crease = square < 1 - 1e-7 && fabs(d) > 1e-7 * sqrt(size);
         for (int i = 0; i < 3; i++) n3[i] = crease ? r[i] / d : -N[i];
         memset(H, 0, 9 * sizeof(double));
-        if (crease) sharp(Sb, uv, n3, r, d, H);
-        else if (bulges[found] > 0) curved(Sb, N, d, H);
+        if (crease) sharp(near.S, near.uv, n3, r, d, H);
+        else if (bulges[near.found] > 0) curved(near.S, N, d, H);
     }
 }
 

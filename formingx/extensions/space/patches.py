@@ -25,6 +25,7 @@ _C = CFunctions("extensions/space/patches.c")
 
 _FLAT = 1e-9               # distance of control points from a flat triangle that is round-off, over the tool's size
 _SHARP = 1e-3              # sine of the angle between two normals from which on an edge of patches is a crease
+_MAX_GUESSES = 50          # numbers of points of which the last nearest triangles are kept, to begin the next search
 _LARGEST_BULGE = 0.35      # of control points out of their triangle, over its longest edge: a patch beyond is made flat
 
 
@@ -76,6 +77,7 @@ class PatchSurface:
         self.patches = np.ascontiguousarray(self.patches)
         self._bulges = np.where(flat, 0.0, bulge)
         self._triangles = points, triangles, facet
+        self._guesses: dict[int, np.ndarray] = {}            # {number of points: nearest triangles before}
         self._boxes = np.concatenate([self.patches.min(1), self.patches.max(1)], 1)
         nodes, links, self._order = np.zeros((2 * m, 6)), np.zeros((2 * m, 2), dtype=int), np.zeros(m, dtype=int)
         used = _C.build(m, self._boxes, nodes, links, self._order)
@@ -109,19 +111,33 @@ class PatchSurface:
         """
         n = len(x)
         d, normal, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
-        triangles = np.empty(n, dtype=int)
+        guess = self._guesses.pop(n, None)
+        triangles, edge = np.full(n, -1) if guess is None else guess.copy(), np.zeros(n, dtype=int)
         _C.nearest(n, x, self._nodes, self._links, self._order, self._boxes, self._bulges, self.patches, d,
-                   normal if derivatives else None, hessian if derivatives else None, triangles)
-        deep = np.flatnonzero(d > 2 * self._bulges.max())
-        if len(deep) and self._bulges.any():                # patches that fold at an edge can give the wrong sign
-            outside = deep[self._flat.distance(np.ascontiguousarray(x[deep])) < 0]
+                   normal if derivatives else None, hessian if derivatives else None, triangles, edge)
+        self._guesses[n] = triangles
+        if len(self._guesses) > _MAX_GUESSES:
+            del self._guesses[next(iter(self._guesses))]
+        bulge = self._bulges.max()
+        far = np.flatnonzero((d > 2 * bulge) | (d < -2 * bulge) & ((edge > 0) | self._folds[triangles]))
+        if len(far) and bulge > 0:                          # patches that fold at an edge can give the wrong sign
+            wrong = far[self._flat.distance(np.ascontiguousarray(x[far])) * d[far] < 0]
             for values in (d, normal, hessian)[:3 if derivatives else 1]:
-                values[outside] *= -1
+                values[wrong] *= -1
         return Distances(d, normal, hessian), triangles
 
     @cached_property
+    def _folds(self) -> np.ndarray:
+        """Mask of the patches whose normal turns against that of their triangle at one of 10 points, shape (m,)."""
+        found, rows = np.zeros(len(self.patches), dtype=bool), np.flatnonzero(self._bulges)
+        for u, v in ((i / 3, j / 3) for i in range(4) for j in range(4 - i)):
+            normal = self.positions(rows, np.tile([u, v], (len(rows), 1)))[1]
+            found[rows] |= np.einsum("ni,ni->n", normal, self._triangles[2][rows]) < 0
+        return found
+
+    @cached_property
     def _flat(self) -> PatchSurface:
-        """The flat triangles. A point deeper inside the patches than their bulges is inside the triangles, too."""
+        """The flat triangles. A point farther from the patches than their bulges is on the same side of both."""
         points, triangles, facet = self._triangles
         return PatchSurface(points, triangles, np.repeat(facet[:, None], 3, axis=1))
 

@@ -11,6 +11,10 @@ import numpy as np
 from ...errors import InputError
 from ...mesh.edges import edges_of
 from .bodies import merged
+from .crossing import crossings
+
+_NEGLIGIBLE_CROSSING = 1e-5
+"""Depth of an edge beyond another triangle that is round-off of a file, over the extent of the surface."""
 
 
 def read_stl(name: str, caller: str = "solid") -> tuple[np.ndarray, np.ndarray]:
@@ -58,3 +62,14 @@ def check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None
             x = points[edges[np.argmax(bad)]].mean(0)
             at = "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
             raise InputError(f"{caller} {words.format(n=int(bad.sum()), at=at)}")
+
+
+def check_simple(points: np.ndarray, triangles: np.ndarray, caller: str) -> None:
+    """Raise an `InputError` if the surface of a body passes through itself; triangles: shape (m, 3)."""
+    size = float(np.ptp(points[triangles], axis=(0, 1)).max())
+    found = crossings(points, triangles, _NEGLIGIBLE_CROSSING * size)
+    if len(found):
+        *x, depth = found[np.argmax(found[:, 3])]
+        at = "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
+        raise InputError(f"{caller} passes through itself at {len(found)} places, an edge by {depth:.3g} at {at}:"
+                         f" inside and outside are not defined there: unite or trim its parts where it was drawn")

@@ -14,7 +14,7 @@ from .corner_normals import corner_normals, misfit
 from .patches import PatchSurface, area_vectors
 from .solid_tool import SolidTool, nearest_of
 from .step_reader import read_step
-from .stl_reader import check_closed, read_stl
+from .stl_reader import check_closed, check_simple, read_stl
 
 CREASE = 40.0
 """Angle between triangles from which on their edge is sharp, degrees, without a `crease`."""
@@ -50,6 +50,8 @@ class Triangulated(SolidTool):
                  crease: float = CREASE):
         self._points, self._triangles, self.name, self.crease = points, triangles, name, crease
         self._bodies = separate_bodies(points, triangles, f"solid: {name!r}")
+        for rows in self._bodies:
+            check_simple(points, triangles[rows], f"solid: {name!r}")
         self._exact_normals = normals is not None and crease > 0
         if normals is None or crease == 0:
             normals = corner_normals(points, triangles, crease)
@@ -146,7 +148,8 @@ def solid(file: str | os.PathLike, *, scale: float = 1.0, inverted: bool = False
         The tool.
 
     Raises:
-        InputError: the file cannot be read, its surface is open (the message says where), or its triangles look inward.
+        InputError: the file cannot be read, its surface is open or passes through itself (the message says where), or
+            its triangles look inward.
 
     >>> cup = fx.tools.revolved(fx.tools.cup(radius=30.0, depth=20.0, draft=5.0).mirrored())
     >>> cup.to_stl("mould.stl", wall=5.0)
