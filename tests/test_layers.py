@@ -42,6 +42,10 @@ def test_depth_of_an_edge_counts_from_half_the_wall_or_from_the_edges():
     assert crossings(points, pair, 0.1) == pytest.approx(np.array([[1, 1, 0, 1], [1.5, 1, 0, 1]]))
     assert len(crossings(points, pair, 0.1, wall=0.9)) == 2 and len(crossings(points, pair, 1.1)) == 0
     assert len(crossings(points, pair, 0.1, wall=1.05)) == 2                # 0.4 of the longest edge is less
+    near, far = points + 0.0, points + np.repeat([[0.0, 0, 0], [9, 0, 0]], 3, axis=0)       # reference positions
+    assert len(crossings(points, pair, 0.1, 1.05, near, crease=5.0)) == 0   # a crease within the wall
+    assert len(crossings(points, pair, 0.1, 1.05, far, crease=5.0)) == 2
+    assert len(crossings(points, pair, 0.1, 0.9, near, crease=5.0)) == 2    # deeper than the wall
     assert len(crossings(points * [1, 1, 0.1], pair, 0.05, wall=0.2)) == 0  # as flat as layers at a pinch
     assert len(crossings(points + np.repeat([[0.0, 0, 0], [0, 0, 3]], 3, axis=0), pair, 0.1)) == 0
 

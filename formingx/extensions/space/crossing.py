@@ -27,6 +27,12 @@ _DEPTH_OF_WALL, _DEPTH_OF_EDGE = 0.5, 0.4
 Layers at a pinch lie within the wall.
 """
 
+_CREASE = 4.0
+"""Distance of two triangles in the reference configuration, over the mean thickness, below which only the wall counts.
+
+A membrane has no bending stiffness: at the end of a pinch it folds within a few walls, where a body is only compressed.
+"""
+
 _BEYOND_PLANE = 0.02
 """Largest distance of a surface beyond a plane of symmetry, over its extent."""
 
@@ -42,7 +48,7 @@ class SelfPenetration:
         self._whole, self._planes = surface.whole, surface.scene.symmetry.planes
         X = self._whole.reference
         thickness = np.sum([given(*X.T) for given in surface.scene.thickness.values()], axis=0)
-        self._wall = _DEPTH_OF_WALL * float(thickness.mean())
+        self._thickness = float(thickness.mean())
 
     def reasons(self, fields: np.ndarray) -> Iterator[str]:
         """Yield each reason why no sheet can have a state, as text; fields: owned unknowns; collective."""
@@ -55,7 +61,8 @@ class SelfPenetration:
                 yield (f"the sheet crosses the plane of symmetry {'xyz'[plane.axis]} = {plane.position:.4g} by"
                        f" {beyond[k]:.3g} at (x, y, z) = ({_position(x[k])}), where its mirror image is: a tool between"
                        f" both halves is missing")
-        found = crossings(x, self._whole.triangles, _DEPTH * size, self._wall)
+        found = crossings(x, self._whole.triangles, _DEPTH * size, _DEPTH_OF_WALL * self._thickness,
+                          self._whole.reference, _CREASE * self._thickness)
         if len(found):
             k = int(np.argmax(found[:, 3]))
             yield (f"the sheet passes through itself at (x, y, z) = ({_position(found[k, :3])}), where an edge of one"
@@ -64,17 +71,20 @@ class SelfPenetration:
                    f" (fx.tools.half), or model one half with Symmetry there, or stop before they meet (until=)")
 
 
-def crossings(points: np.ndarray, triangles: np.ndarray, least: float, wall: float = 0.0) -> np.ndarray:
+def crossings(points: np.ndarray, triangles: np.ndarray, least: float, wall: float = 0.0,
+              reference: np.ndarray | None = None, crease: float = 0.0) -> np.ndarray:
     """Return the places where edges of a surface pass through its triangles, and their depths, (k, 4), length.
 
     The depth is the smaller distance of the ends of an edge from the plane of the triangle. Edges count that are deeper
-    than `least`, and deeper than `wall` or 0.4 of the longest edge
-    of their triangle.
+    than `least`, and deeper than `wall` or 0.4 of the longest edge of their triangle. Of two triangles that are nearer
+    than `crease` in the reference configuration, shape (n, 3), `wall` alone counts.
     """
+    X = points if reference is None else reference
     room = 100
     while True:
         found = np.empty((room, 4))
-        count = _C.crossings(len(triangles), points, triangles, least, wall, _DEPTH_OF_EDGE, room, found)
+        count = _C.crossings(len(triangles), points, triangles, least, wall, _DEPTH_OF_EDGE, X, crease, room,
+                             found)
         if count < 0:
             raise MemoryError("no memory to compare the triangles of a surface")
         if count <= room:

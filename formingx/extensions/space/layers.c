@@ -8,6 +8,8 @@ typedef struct {
     const double *P, *boxes, *nodes;
     const long *triangles, *links, *items;
     double least, wall, share;
+    const double *X;
+    double crease;
     long most, count;
     double *found;
 } search;
@@ -38,7 +40,8 @@ static int inside(const double **corner, const double *n, const double *x)
 }
 
 /* The edges of triangle s that pass through triangle t. The depth of an edge is the smaller distance of its ends from
-   the plane; it counts from max(least, min(wall, share of the longest edge of s)) on. */
+   the plane; it counts from max(least, min(wall, share of the longest edge of s)) on, and from max(least, wall) on if
+   the triangles are neighbours: nearer than `crease` to each other in the reference configuration X. */
 static void pass_through(search *all, long s, long t)
 {
     const double *corner[3], *end[3];
@@ -55,7 +58,13 @@ static void pass_through(search *all, long s, long t)
         away(end[k], corner[0], r);
         d[k] = dot(r, n) / size;
     }
-    double limit = fmax(all->least, fmin(all->wall, all->share * longest));
+    double limit = fmax(all->least, fmin(all->wall, all->share * longest)), middle[2][3] = {{0}};
+    for (int k = 0; k < 3; k++)
+        for (int i = 0; i < 3; i++) {
+            middle[0][i] += all->X[3 * all->triangles[3 * s + k] + i] / 3;
+            middle[1][i] += all->X[3 * all->triangles[3 * t + k] + i] / 3;
+        }
+    if (away(middle[0], middle[1], r) < all->crease * all->crease) limit = fmax(all->least, all->wall);
     for (int k = 0; k < 3; k++) {
         int l = (k + 1) % 3;
         double depth = fmin(fabs(d[k]), fabs(d[l])), x[3];
@@ -102,8 +111,8 @@ static void descend(search *all, long a, long b)
 
 /* Number of crossings of the m triangles (m, 3) with corners P; the first `most` are written to `found` (most, 4) as
    place and depth. Returns -1 if there is no memory. */
-long crossings(long m, const double *P, const long *triangles, double least, double wall, double share, long most,
-               double *found)
+long crossings(long m, const double *P, const long *triangles, double least, double wall, double share,
+               const double *X, double crease, long most, double *found)
 {
     double *boxes = malloc(6 * m * sizeof(double)), *nodes = malloc(12 * m * sizeof(double));
     long *links = malloc(4 * m * sizeof(long)), *items = malloc(m * sizeof(long)), count = -1;
@@ -115,7 +124,7 @@ long crossings(long m, const double *P, const long *triangles, double least, dou
                 boxes[6 * t + i] = fmin(a, fmin(b, c)); boxes[6 * t + 3 + i] = fmax(a, fmax(b, c));
             }
         build(m, boxes, nodes, links, items);
-        search all = {P, boxes, nodes, triangles, links, items, least, wall, share, most, 0, found};
+        search all = {P, boxes, nodes, triangles, links, items, least, wall, share, X, crease, most, 0, found};
         descend(&all, 0, 0);
         count = all.count;
     }

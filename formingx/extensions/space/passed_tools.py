@@ -8,6 +8,7 @@ on the side of the sheet that its contact names.
 from __future__ import annotations
 
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -133,8 +134,20 @@ def surface_points(tool: Any, spacing: float, nodes: np.ndarray, margin: float) 
     Drawn triangles are divided to `spacing`, and the points moved onto the tool, without those inside another part.
     nodes: of the flat sheet, shape (m, 3), length.
     """
-    points, triangles = tool.surface()
     low, high = nodes[:, :2].min(0) - margin, nodes[:, :2].max(0) + margin
+    key = (spacing, *low, *high)
+    if key not in _stored.setdefault(tool, {}):
+        _stored[tool][key] = _surface_points(tool, spacing, low, high)
+    return _stored[tool][key]
+
+
+_stored: WeakKeyDictionary[Any, dict[tuple[float, ...], np.ndarray]] = WeakKeyDictionary()
+"""Points on tools, of the arguments with which they were asked for."""
+
+
+def _surface_points(tool: Any, spacing: float, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return the points of `surface_points` between two corners in the plane, shape (2,), length."""
+    points, triangles = tool.surface()
     corners = points[triangles]
     over = (corners[..., :2].max(1) >= low).all(1) & (corners[..., :2].min(1) <= high).all(1)
     corners = corners[over]
