@@ -79,7 +79,8 @@ MUTANTS = [Mutant(*row) for row in [
      "return -1.002 * float(combined(self.comm, left, MPI.SUM))", "compression closed_forms"),
     ("problem/problem.py", "out.array_w += (control - 1) * stage.unbalanced",
      "out.array_w += (control - 0.5) * stage.unbalanced", "process"),
-    ("problem/problem.py", "self.variables, self._predicted = stored", "self._predicted = stored[1]", "details"),
+    ("problem/problem.py", "self.history.variables, self.history.predicted = variables, predicted",
+     "self.history.predicted = predicted", "details"),
     ("forms/admissible.py", "> 0))\n                    for", "> -0.5))\n                    for", "admissible"),
     ("forms/constraints.py", "active * row for (_, row), active", "row for (_, row), active", "process"),
     # materials

@@ -65,7 +65,7 @@ def test_a_predicted_step_ends_near_its_state():
     with problem.state_context(old):
         length = curve.progress(old, new)
         limit = problem.contact.limit
-        trial = TrialStep(old.x, old.control, old.direction, old.slope, length, limit.predict(curve, old))
+        trial = TrialStep(old.x, old.control, old.direction, old.slope, length, limit.predictor.predict(curve, old))
         limit.length(trial)
         dx, dc = limit.prepare(trial)
         V, steps = response_at(curve, old).to_points([np.array([point])])

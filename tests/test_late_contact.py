@@ -59,10 +59,10 @@ def test_deep_penetration_is_reported(drawn):
     """A penetration of 0.2 at the last state is a serious finding; one of 5 makes the state inadmissible."""
     path = drawn
     state, found, up = path.last, path.last.x.copy(), np.arange(2, len(path.last.x), 3)
-    assert serious(path) == [] and path._view(path.record.segments[-1]).admissibility.reason(state) == ""
+    assert serious(path) == [] and path.record.judge(state) == ""
     state.x[up] = found[up] + 0.2 / path.problem.forms.length
     (words,) = serious(path)
     assert "point is 0.2 deep in the tool of 'plug' at (x, y, z) = (" in words
     state.x[up] = found[up] + 5.0 / path.problem.forms.length
-    assert "deep in the tool of 'plug'" in path._view(path.record.segments[-1]).admissibility.reason(state)
+    assert "deep in the tool of 'plug'" in path.record.judge(state)
     state.x[up] = found[up]

@@ -72,7 +72,7 @@ def test_a_run_whose_steps_grow_is_not_given_up():
     def stalled(values):
         targets = object.__new__(progress.RunTargets)
         targets.values, targets.until = values, fx.pressure(1.0)
-        return targets.stalled()
+        return targets.no_progress()
     assert stalled([1e-4 * k / 500 for k in range(501)]) and stalled([0.0] * 501)
     assert stalled([-1e-7 * k for k in range(501)])
     assert not stalled([1e-4 * 1.01 ** (k - 500) for k in range(501)])

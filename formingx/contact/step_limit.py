@@ -331,25 +331,27 @@ class StepLimit:
         problem: the `Problem`.
 
     Attributes:
+        active_contacts: the `Approach` of each contact that is active in the current stage.
         several_closures: True if several gaps may close in one step, in the predicted order.
+        predictor: predictor of contact events, or None.
     """
 
     def __init__(self, problem: Any):
         self._n, heat = problem.n_owned, problem.scene.heat
         self._all = [getattr(face.contact.tool, "approach", Approach)(
             face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
+        self.active_contacts: list[Approach] = []
         self.several_closures = not problem.scene.one_node_per_step
         make = type(self).make_predictor
-        self._predictor = make(self) if make else None
+        self.predictor = make(self) if make else None
 
     make_predictor: ClassVar[Callable[[StepLimit], EventPredictor] | None] = None
     """Function that makes the predictor of contact events of a `StepLimit`; an extension sets it. Without it, a step
     ends where the gap of a sticking point closes."""
 
-    @property
-    def active_contacts(self) -> list[Approach]:
-        """The `Approach` of each contact that is active in the current stage."""
-        return [approach for approach in self._all if approach.face.active]
+    def note_active(self) -> None:
+        """Set `active_contacts` after a change of the stage."""
+        self.active_contacts = [approach for approach in self._all if approach.face.active]
 
     @property
     def only_sticks(self) -> bool:
@@ -360,15 +362,11 @@ class StepLimit:
     @property
     def predicts_events(self) -> bool:
         """True if contact events after an accepted state are predicted."""
-        return self._predictor is not None and self._predictor.active
+        return self.predictor is not None and self.predictor.active
 
     def end_at_closures(self) -> None:
         """End each further step at the next gap closure, without prediction of contact events."""
         self.several_closures = False
-
-    def predict(self, curve: Any, state: Any) -> EventPrediction | None:
-        """Return the predicted contact events after an accepted state; None if none are predicted."""
-        return self._predictor.predict(curve, state) if self._predictor else None
 
     def length(self, trial: TrialStep) -> float:
         """Return the largest admissible arc length, at most `trial.length`, of a step along a tangent.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 
@@ -46,7 +47,7 @@ class StepData:
         rate = [float(scene.driven is not None and t.driven) for t in scene.items] + [0.0]
         return cls([0.0] * len(rate), rate, [])
 
-    @property
+    @cached_property
     def controlled(self) -> int | None:
         """Index in `rate` of the quantity that the control changes; None if nothing changes.
 

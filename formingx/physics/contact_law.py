@@ -404,8 +404,8 @@ class NormalLaw(ContactLaw):
             return self.nearest(x).distance
         return self.tool.signed_distance(x).reshape(x.shape[:-1]) - self.shift
 
-    @property
-    def profile(self) -> Tool | None:
+    @cached_property
+    def profile(self) -> Tool | None:  # type: ignore[override]
         own = type(self).distance is NormalLaw.distance and type(self).nearest is NormalLaw.nearest
         return self.tool if own and type(self.tool) is Tool else None
 

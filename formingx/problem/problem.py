@@ -35,6 +35,8 @@ from ..scene.scene import Scene
 from ..scene.target_checks import implausible
 from .examine import Examination
 
+_NOTHING_PREDICTED: tuple[Any, list[Any]] = (None, [])
+
 
 class _Stage(NamedTuple):
     """Equations of one set of step data, for steps from the state at which it was set.
@@ -319,14 +321,15 @@ class Problem:
         entries), control, time, setting (`StepData` as plain data, or empty) and history_variables.
         """
         fields, control, clock = self._fields.copy(), self.control, self.forms.clock
-        stage, history, x = self._stage, self.history.stored(), self.x.array_r.copy()
+        stage, x = self._stage, self.x.array_r.copy()
+        variables, predicted = self.history.variables, self.history.predicted
         try:
             self.restore(state)
             self.x.array_w[:] = state.x
             self.set_state(self.x, state.control)
             yield self
         finally:
-            self.history.put_back(history)
+            self.history.variables, self.history.predicted = variables, predicted
             self._set_stage(stage)
             self.forms.clock = clock
             self.x.array_w[:] = x
@@ -378,7 +381,7 @@ class Problem:
         for contact in self.contacts:
             i = number[id(contact.contact)]
             contact.enter(setting.base[i], setting.rate[i], i not in setting.inactive)
-        self.contact.faces = [contact for contact in self.contacts if contact.active]
+        self.contact.note_active()
         self.setting, self.constrained = setting, stage.constrained
         if "_tangent" in vars(self):
             self._tangent.enter(stage.active, setting.rate, before is None or before.active is not stage.active)
@@ -416,6 +419,11 @@ class Contacts:
         self._problem, self._n = problem, problem.n_owned
         self.faces: list[FaceContact] = []
         self.limit = StepLimit(problem)
+
+    def note_active(self) -> None:
+        """Set the contacts that are active after a change of the stage."""
+        self.faces = [face for face in self._problem.contacts if face.active]
+        self.limit.note_active()
 
     @property
     def status(self) -> Any:
@@ -470,6 +478,8 @@ class ProblemHistories:
         path_dependent: True if F depends on earlier states.
         body_path_dependent: True if materials or the temperature have history variables.
         rate_dependent: True if the body depends on process time, through a material or through its temperature.
+        predicted: x, and the history variables of materials and temperature there, from the last call of `predict`.
+        time_at: function of the control that returns the process time.
     """
 
     def __init__(self, problem: Problem):
@@ -479,7 +489,7 @@ class ProblemHistories:
         self.materials = [history for history in of_body if isinstance(history, ConstitutiveHistory)]
         self.path_dependent, self.body_path_dependent = bool(self.parts), bool(of_body)
         self.rate_dependent = len(self.materials) < len(of_body) or any(m.rate_dependent for m in self.materials)
-        self._predicted: tuple[Any, list[Any]] = None, []   # x, and the history variables of the forms at x
+        self.time_at, self.predicted = self._forms.time_at, _NOTHING_PREDICTED
 
     @property
     def variables(self) -> list[Any]:
@@ -488,17 +498,9 @@ class ProblemHistories:
 
     @variables.setter
     def variables(self, variables: list[Any]) -> None:
-        self._predicted = None, []
+        self.predicted = _NOTHING_PREDICTED
         for history, stored in zip(self.parts, variables, strict=True):
             history.put(stored)
-
-    def stored(self) -> tuple[list[Any], tuple[Any, list[Any]]]:
-        """Return the current history variables and predicted ones for `put_back`."""
-        return self.variables, self._predicted
-
-    def put_back(self, stored: tuple[list[Any], tuple[Any, list[Any]]]) -> None:
-        """Restore what `stored` returned."""
-        self.variables, self._predicted = stored
 
     @property
     def clock(self) -> float:
@@ -509,18 +511,15 @@ class ProblemHistories:
     def clock(self, time: float) -> None:
         self._forms.clock = time
 
-    def time_at(self, control: float) -> float:
-        return self._forms.time_at(control)
-
     def advance(self, x: np.ndarray, control: float) -> None:
         if self.body_path_dependent:
             self._problem.set_fields(x, control)
-        known = self._predicted[1] if self._predicted[0] is x else []
+        known = self.predicted[1] if self.predicted[0] is x else []
         for history in self.parts[: len(self.parts) - len(known)]:
             history.advance(x[: self._problem.n_owned], control)
         for history, variables in zip(self._forms.histories, known):
             history.put(variables)
-        self._predicted = None, []
+        self.predicted = _NOTHING_PREDICTED
 
     def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
         """Return the history variables of materials and temperature at the end of a step that is not yet accepted.
@@ -532,7 +531,7 @@ class ProblemHistories:
         for history in self._forms.histories:
             history.advance(x[: self._problem.n_owned], control, start)
         after = [history.get() for history in self._forms.histories]
-        self._predicted = x, after
+        self.predicted = x, after
         return after
 
     @cached_property

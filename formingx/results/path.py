@@ -88,7 +88,7 @@ class Path:
             self._views = other._views
         self._view(record.segments[-1])                      # compiles the forms before the run
         record.hooks.on_state.append(self._measure)
-        record.judge = lambda state: self._view(record.segments[-1]).admissibility.reason(state)
+        record.judge = lambda state: next(self._view(record.segments[-1]).admissibility.reasons(state), "")
 
     @property
     def states(self) -> list[State]:

@@ -318,13 +318,13 @@ class _Points:
         Return the change of dx, locally owned entries, shape (n,), and of step; None if no solution was found.
         """
         y0 = self._gather(self._moved(dx.array_r, step))
-        f0, S0 = self._linearised()
+        f0, S0 = self._forces([c.increment.last_tractions(i) for c, i in self._some])
         laws, ramps = [c.increment.law_at(i) for c, i in self._some], list[Any]()
         y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
         accuracy = _LOCAL.accuracy * min([c.law.theta for c in self._contacts])
         for k in range(_LOCAL.max_iterations):
-            f, S = self._law(laws, y)
+            f, S = self._forces([(found.force, found.stiffness) for found in self._at_faces(laws, y)])
             added = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
             with np.errstate(over="ignore", invalid="ignore"):
                 R = y - y0 + self._C @ added
@@ -394,14 +394,6 @@ class _Points:
         They are relative to the tools, shape (p c,) or (p c, m), length."""
         motions = [c.relative_motion(dx, step)[i] for c, i in zip(self._contacts, self._chosen)]
         return np.concatenate([motion.reshape(-1, *dx.shape[1:]) for motion in motions])
-
-    def _linearised(self) -> tuple[Array, Array]:
-        """Return tractions, shape (k c,), and stiffnesses, shape (k, c, c), at which the law was linearised."""
-        return self._forces([c.increment.last_tractions(i) for c, i in self._some])
-
-    def _law(self, laws: list[Any], y: Array) -> tuple[Array, Array]:
-        """Return tractions, shape (k c,), and stiffnesses, shape (k, c, c), after motions y, shape (k c,), length."""
-        return self._forces([(tractions.force, tractions.stiffness) for tractions in self._at_faces(laws, y)])
 
     def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
         """Gather the tractions, shape (k c,), and stiffnesses, shape (k, c, c), from each face's (p, c), (p, c, c)."""

@@ -110,21 +110,20 @@ class ModifiedNewton:
 
     Args:
         settings: settings of Newton's method.
+
+    Attributes:
+        setting: step data of the last factorised tangent, which later iterations may keep; None if it is singular.
     """
 
     def __init__(self, settings: Newton) -> None:
         self._settings = settings
-        self._setting: StepData | None = None                # step data of the factorised tangent, or None
+        self.setting: StepData | None = None
         self._before, self._fall = 0.0, 1.0
-
-    def note_tangent(self, setting: StepData | None) -> None:
-        """Note the step data of a factorised tangent, which later iterations may keep; None if it is singular."""
-        self._setting = setting
 
     def begin(self, setting: StepData | None, allowed: bool) -> None:
         """Begin a run of Newton's method; only a tangent with the same step data is kept, and only if `allowed`."""
         self._allowed, self._first = allowed, True
-        self._fall = self._before if self._setting is setting else 1.0
+        self._fall = self._before if self.setting is setting else 1.0
 
     def keeps(self, residual: float, requested: float) -> bool:
         """Return True if `Newton.max_chords` chord iterations are expected to reach the relative residual `requested`.
@@ -329,7 +328,7 @@ class BorderedNewton:
         if self._drag:
             self._drag.add_to(matrix)
         good, self._update = self.solver.factorise(rescale), None
-        self._modified.note_tangent(self.problem.setting if good else None)
+        self._modified.setting = self.problem.setting if good else None
         if good and not self._drag:
             self.problem.control_derivative(x, control, self.F_control, one_sided)
         return good

@@ -98,13 +98,14 @@ class Run:
             self.targets.close_reached(record.last)
             self._complete_step()
             while self.targets.is_open():
+                self._check_progress()
                 if max_steps is not None and record.counts.steps - before >= max_steps:
                     self._give_up(f"max_steps = {max_steps} were used up before it", pace=self.targets.pace(max_steps))
-                self._check_progress()
                 states = self.states
                 for state in self._next_states(states[-1]):
                     self._accept(state)
-                    self._stop_if(self.targets.jumped_past(state))
+                    if state.kind == "jump" and (why := self.targets.jumped_past()):
+                        self._give_up(why)
                     if state.kind == "limit point" and self._jumps.rule == "stop":
                         record.ended = f"the {self._control_name} has a limit point at {record.describe(state)}"
                     if record.ended or self.problem.history.path_dependent or self._jumps.rule == "snap_through":
@@ -115,7 +116,6 @@ class Run:
                 warn_of_branches(record, self.states[len(states) - 1:])
                 if record.ended:
                     break
-                self._stop_if(self.targets.turned_back())
                 self._progress.show(self.targets.gained(), len(self.states), self.step.length)
         except BaseException:
             record.counts.seconds += self._elapsed()
@@ -195,11 +195,11 @@ class Run:
         first state with history variables, nor near the control of an earlier snap-through without equilibrium.
         """
         first, failed, most, limit, end = self.step.length, 0, np.inf, self.problem.contact.limit, None
-        lengths, last = [*self.settings.snap_through.lengths_for(limit), 0.0], self.settings.snap_through.lengths[-1]
+        lengths, last = list[float](), self.settings.snap_through.lengths[-1]
         self._orientation = OrientationCheck(self.curve, self.settings.snap_through.lengths[0])
         if snaps(self.curve, old, self._jumps.rule, self._sense):
             return self._snap(old)
-        events: Any = limit and limit.predict(self.curve, old)                         # type: ignore[arg-type]
+        events = limit.predictor.predict(self.curve, old) if limit and limit.predictor else None
         self._trial = TrialStep(old.x, old.control, old.direction, old.slope, 0.0, events)
         while True:
             length = min(self.step.length, most)
@@ -222,6 +222,7 @@ class Run:
                     continue
                 self.step.length, end = length, None
                 log.info("a step of length %.3g failed: %s", length, failure.reason)
+                lengths = lengths or [*self.settings.snap_through.lengths_for(limit), 0.0]
                 good, failed = self.step.failed(), failed + (not isinstance(failure, _PassedState))
                 self._failed(failure.reason, self.step.length)
                 self._trial = self._trial._replace(events=None if failed > 1 else self._trial.events)
@@ -351,20 +352,16 @@ class Run:
         return new
 
     def _check_progress(self) -> None:
-        """Give up if the last states came no nearer to the target, or the control has an implausible value.
+        """Raise a `ConvergenceError` if the last states lead away from the target or came no nearer to it.
 
-        To give up is to raise a `ConvergenceError`.
+        It is raised for an implausible value of the control, too.
         """
         control = self.record.last.control
         reason = self.problem.description.implausible(control)
         if reason is not None:
             value = self.problem.description.shown(control)[1]
             self._give_up(f"the {self._control_name} has come to {value:.4g}, beyond any process: {reason}")
-        self._stop_if(self.targets.stalled())
-
-    def _stop_if(self, why: str) -> None:
-        """Give up the run with the reason `why`, unless it is ""."""
-        if why:
+        if why := self.targets.no_progress():
             self._give_up(why)
 
     def _states_within(self, old: State, new: State) -> list[State]:

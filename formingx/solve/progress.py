@@ -115,38 +115,31 @@ class RunTargets:
 
     # reasons for a run to give up, as text; "" if there is none
 
-    def turned_back(self) -> str:
-        """Return a reason to give up if the path leads away from the last target, else "".
+    def no_progress(self) -> str:
+        """Return a reason to give up if the path leads away from the last target, or came no nearer to it, else "".
 
-        The progress must have fallen below half of its largest value; below 0 for a target of the control.
+        The progress must have fallen below half of its largest value; below 0 for a target of the control. Or the last
+        `patience` states changed it by less than 1e-3. A run goes on if their second half gained more than twice as
+        much as their first half: its steps grow.
         """
-        if not self.is_open():
-            return ""
         gained = self.gained()
         self._best = max(self._best, gained)
         kept = 0.0 if self.is_control else 0.5
         if self._best > 0.05 and gained < kept * self._best or gained < -0.05:
             return ("the path turned back, away from the target; a crease at a singular corner (a clamped rim on a fine"
                     " mesh) can cause that")
+        if len(self.values) > self.patience:
+            first, middle = (self.gained(self.values[-1 - k]) for k in (self.patience, self.patience // 2))
+            if abs(gained - first) < 1e-3 and gained - middle <= 2 * abs(middle - first):
+                return f"the last {self.patience} states came no nearer to the target"
         return ""
 
-    def jumped_past(self, state: State) -> str:
-        """Return a reason to give up if the body has snapped to a state beyond the last target, else ""."""
-        if state.kind == "jump" and self.is_open():
+    def jumped_past(self) -> str:
+        """Return a reason to give up if the last state, after a snap-through, lies beyond the last target, else ""."""
+        if self.is_open():
             before, now = self.values[-2:]
             if (before - self.until.value) * (now - self.until.value) < 0:
                 return f"the body snaps past the target, from {before:.6g} to {now:.6g}: no equilibrium lies between"
-        return ""
-
-    def stalled(self) -> str:
-        """Return a reason to give up if the last `patience` states came no nearer to the last target, else "".
-
-        The run goes on if their second half gained more than twice as much as their first half: its steps grow.
-        """
-        if len(self.values) > self.patience:
-            first, middle, last = (self.gained(self.values[-1 - k]) for k in (self.patience, self.patience // 2, 0))
-            if abs(last - first) < 1e-3 and last - middle <= 2 * abs(middle - first):
-                return f"the last {self.patience} states came no nearer to the target"
         return ""
 
     def pace(self, max_steps: int) -> str:

@@ -88,14 +88,6 @@ class AdmissibilityCheck:
             self._faces = [self._outline.mask(contact.contact.on) for contact in problem.contacts]
             self._reference_lengths = _lengths(self._outline.reference_edges)
 
-    def reason(self, state: State) -> str:
-        """Return the reason why a state is inadmissible, or "" if it is admissible; collective.
-
-        Args:
-            state: a state with its output quantities (`State.measures`).
-        """
-        return next(self._reasons(state), "")
-
     def findings(self, state: State) -> list[Finding]:
         """Return findings on penetration of the tools in an admissible state; collective.
 
@@ -127,8 +119,9 @@ class AdmissibilityCheck:
                                      f" smaller elements there, or a larger fillet."))
         return found
 
-    def _reasons(self, state: State) -> Iterator[str]:
-        """Yield each reason why a state is inadmissible, as text; collective."""
+    def reasons(self, state: State) -> Iterator[str]:
+        """Yield each reason why a state with output quantities (`State.measures`) is inadmissible, as text; collective.
+        """
         measures = state.measures
         for name, value in measures.items():
             if not np.isfinite(value):
