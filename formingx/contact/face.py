@@ -129,17 +129,19 @@ class Increment:
     def predicted(self, motion: np.ndarray) -> Tractions:
         """Return the law linearised after a further motion y of all points, shape (n, c), length.
         Traction f and stiffness S are those before the motion: after it the traction is f + S y."""
-        x, predicted = self._last[0], self._predicted_motion(slice(None))
-        return self._law.tractions(x, self._history, None, predicted(motion))
+        assert self._before is not None
+        x = self._last[0]
+        return self._law.tractions(x, self._history, None, self._before.to(x + motion))
 
     def law_at(self, points: np.ndarray) -> Callable[[np.ndarray], Tractions]:
         """Return `predicted` for m points: a function of their motion y, shape (m, c), length.
 
         Its `Tractions` have the traction f and stiffness S before the motion; after it the traction is f + S y.
         """
+        assert self._before is not None
         history = self._history and ContactHistory(*[part[points] for part in self._history])
-        law, x, predicted = self._law.part(points), self._last[0][points], self._predicted_motion(points)
-        return lambda motion: law.tractions(x, history, None, predicted(motion))
+        law, x, before = self._law.part(points), self._last[0][points], self._before.part(points)
+        return lambda motion: law.tractions(x, history, None, before.to(x + motion))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
         """Return a function that predicts how deep m points are in the ramp after a motion, shape (m, c), length.
@@ -156,12 +158,6 @@ class Increment:
         def depth_and_path(motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             return before.distance_at(x + motion) / width + 0.5, width * sticks * before.normal
         return depth_and_path
-
-    def _predicted_motion(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Motion]:
-        """Return a function from the motion of m points, shape (m, c), length, to their predicted `Motion`."""
-        assert self._before is not None
-        before, x = self._before.part(points), self._last[0][points]
-        return lambda motion: before.to(x + motion)
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
         """Set the sense of sliding, 1, -1 or 0 (sticking), at masked points, shape (n,) both, for `linearise`."""

@@ -597,7 +597,7 @@ class Law(NormalLaw):
         d = self.distance(x)
         if self.adhesive:                                   # at the outer edge of the ramp it sticks, free of stress
             d = np.where(np.abs(d / self.theta + 1) < RAMP_EDGE, -(1 - RAMP_EDGE) * self.theta, d)
-        return _history(x.copy(), d, np.zeros(len(x)))
+        return ContactHistory(x.copy(), d, np.zeros(len(x)), x.copy())
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
@@ -610,7 +610,7 @@ class Law(NormalLaw):
         n, out = len(x), self._evaluate(x, old, sense, expected)
         N, T, slides = out[2 * n:3 * n], out[3 * n:4 * n], out[4 * n:5 * n]
         return Tractions(out[:2 * n].reshape(n, 2), N, T, slides, lambda: out[5 * n:9 * n].reshape(n, 2, 2),
-                         lambda: _history(x, out[9 * n:10 * n], out[10 * n:11 * n]))
+                         lambda: ContactHistory(x, out[9 * n:10 * n], out[10 * n:11 * n], x))
 
     def _evaluate(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> np.ndarray:
@@ -698,8 +698,3 @@ def symmetric_stiffness(law: ContactLaw, x: np.ndarray, old: ContactHistory | No
     tangent = law.nearest(x).tangent
     sticking = law.hoop_stiffness(x, old, np.full(len(x), np.inf))
     return law.with_friction(0.0).tractions(x, old).stiffness + outer(tangent, sticking[:, None] * tangent)
-
-
-def _history(x: np.ndarray, d: np.ndarray, slip: np.ndarray) -> ContactHistory:
-    """Return a `ContactHistory` with closures at the present positions, shape (n, 2); d, slip: (n,), length."""
-    return ContactHistory(x, d, slip, x)

@@ -581,18 +581,22 @@ class SceneDescription:
     main_columns: Sequence[str] = cached_property(lambda self: [  # type: ignore[assignment]
         "process_time", *map(self._scene.column, self._scene.drivable), "pole_height", "pole_stretch"])
 
+    @cached_property
+    def _names(self) -> list[str]:
+        """Name of each item that can be controlled, then "process time"."""
+        columns = [self._scene.column(item) if item.quantity else "" for item in self._scene.items]
+        return [*(column.replace("_", " ") for column in columns), "process time"]
+
     @property
     def control_kind(self) -> str | None:
         number, items = self._problem.setting.controlled, self._scene.items
         return None if number is None else "time" if number == len(items) else items[number].quantity
 
     def shown(self, control: float) -> tuple[str, float]:
-        setting, items = self._problem.setting, self._scene.items
+        setting = self._problem.setting
         number = setting.controlled
-        if number is None:
-            return "control", control
-        name = "process time" if number == len(items) else self._scene.column(items[number]).replace("_", " ")
-        return name, self.scales[number] * setting.amplitude(number, control)
+        return ("control", control) if number is None else (
+            self._names[number], self.scales[number] * setting.amplitude(number, control))
 
     def implausible(self, control: float) -> str | None:
         return implausible(self._scene, self.control_kind, self.shown(control)[1])

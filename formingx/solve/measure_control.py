@@ -68,7 +68,7 @@ class QuantityRun(Run):
                  targets: Sequence[tuple[Target, Quantity]], step: StepControl | None, accuracy: float,
                  label: str = ""):
         end = process_time(times[-1])
-        super().__init__(record, [*targets, (end, end.bind(record.equations))], step, "continue", accuracy, label)
+        super().__init__(record, [*targets, (end, end.bind(record.curve.problem))], step, "continue", accuracy, label)
         self._quantity, self._amplitude, self._times, self._duration = quantity, amplitude, times, times[-1] - times[0]
 
     def _accept(self, state: State) -> None:

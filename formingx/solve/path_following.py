@@ -67,7 +67,7 @@ class Run:
     def __init__(self, record: Record, targets: Sequence[tuple[Target, Quantity]], step: StepControl | None = None,
                  at_limit_point: str | None = None, accuracy: float = 2e-3, label: str = "",
                  requested: Target | None = None):
-        self.record, self._label, self.curve, self.problem = record, label, record.curve, record.equations
+        self.record, self._label, self.curve, self.problem = record, label, record.curve, record.curve.problem
         self._accuracy = accuracy
         self._time_error = TimeError(self.problem, accuracy) if self.problem.history.rate_dependent else None
         self.targets = RunTargets(self.curve, targets, requested)
@@ -378,7 +378,7 @@ class Run:
         for target, quantity in self.targets.open:
             if target is new.target:
                 continue
-            a, b = (self.curve.value(quantity, s.x, s.control) - target.value for s in (old, new))
+            a, b = [self.curve.value(quantity, s.x, s.control) - target.value for s in (old, new)]
             if a * b < 0:
                 try:
                     state = self.curve.state_at_value(old, new, quantity, target.value)

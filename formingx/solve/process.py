@@ -60,7 +60,7 @@ class Execution:
     def __init__(self, record: Record, plans: list[Plan], unchecked: list[Plan],
                  check: Callable[[Plan, Callable[[int], float]], None], step: StepControl | None, balanced: float,
                  accuracy: float = 2e-3):
-        problem = record.equations
+        problem = record.curve.problem
         self.record, self.curve, self.problem = record, record.curve, problem
         self.plans, self._unchecked, self._check, self._step, self._balanced = plans, unchecked, check, step, balanced
         self._accuracy = accuracy

@@ -110,11 +110,6 @@ class Record:
         return self.segments[-1].problem
 
     @property
-    def equations(self) -> Equations:
-        """Problem that the run solves at the moment, as the solver sees it (`Equations`)."""
-        return self.curve.problem
-
-    @property
     def curve(self) -> Curve:
         """Solver of the current problem."""
         return self.segments[-1].curve
@@ -145,7 +140,7 @@ class Record:
         setting = self.last.setting
         states = list(itertools.takewhile(lambda s: s.setting == setting, reversed(self.segments[-1].states)))
         for state in (states[-1], self.last):
-            self.equations.restore(state)
+            self.curve.problem.restore(state)
         return len(states)
 
     def continue_from(self, other: Record) -> None:
@@ -160,7 +155,8 @@ class Record:
 
         Raise `InadmissibleState` if no body can have this state; the record is then unchanged.
         """
-        problem, variables = self.equations, self.equations.history.variables
+        problem = self.curve.problem
+        variables = problem.history.variables
         problem.history.advance(state.x, state.control)
         state.history_variables, state.history_variables_before = problem.history.variables, variables
         state.stage, state.setting = self.stage, asdict(problem.setting)
@@ -186,7 +182,7 @@ class Record:
         `entries` are numbers, lists and dicts that a checkpoint can hold.
         """
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
-                              "column": self.equations.description.shown(0.0)[0].replace(" ", "_"), **entries}
+                              "column": self.curve.problem.description.shown(0.0)[0].replace(" ", "_"), **entries}
         for listener in self.hooks.on_step:
             listener()
 
@@ -196,5 +192,5 @@ class Record:
         Values that no body can have are left out, such as the pole stretch of a wall whose thickness is not positive.
         """
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
-            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.equations.description.main_columns
+            f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.curve.problem.description.main_columns
             if abs(state.measures.get(k, math.inf)) < 1e100)
