@@ -98,7 +98,6 @@ MUTANTS = [Mutant(*row) for row in [
      "temperature materials"),
     # solution path
     ("solve/path_following.py", "if (limit.control - old.control) * old.slope < 0:", "if False:", "treloar"),
-    ("solve/path_following.py", "if was_passed(self.curve", "if False and was_passed(self.curve", "details"),
     ("solve/path_following.py", "if error > self.settings.max_time_error:", "if False:", "steps_in_time time accuracy"),
     ("solve/path_following.py", "if not 0 < self.curve.progress(old, new) < 2 * length:", "if False:",
      "details"),
@@ -111,8 +110,7 @@ MUTANTS = [Mutant(*row) for row in [
      "self.dissipated += self._sum(pull * dx)", "details"),
     ("solve/snap_through.py", "0.5 * (max(self._sum(self._pull * dx), 0.0) +", "0.5 * (self._sum(self._pull * dx) +",
      "details"),
-    ("solve/snap_through.py", "if self._moves_back(self._old, state) or was_passed(", "if False and was_passed(",
-     "bottle"),
+    ("solve/snap_through.py", "or was_passed(self.curve, self._passed, self._old, state)", "", "bottle"),
     ("solve/branches.py", "sense = -1 if curve.progress(last, state) < 0 else 1", "sense = 1", "stability"),
     ("results/evaluate/admissibility.py", "penetration: float = 0.15", "penetration: float = 0.45",
      "inadmissible_states"),

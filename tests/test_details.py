@@ -17,7 +17,7 @@ from formingx.contact.step_limit import TrialStep
 from formingx.measures.targets import Amplitude
 from formingx.problem.problem import Problem
 from formingx.results.evaluate.part import _strips
-from formingx.solve import branches, path_following, predictor, snap_through
+from formingx.solve import branches, predictor, snap_through
 from formingx.solve.arc_length import Curve
 from formingx.solve.newton import Failure
 from formingx.solve.progress import RunTargets
@@ -121,19 +121,6 @@ def test_derivative_of_slip_on_a_curved_tool_is_consistent(tool):
         smooth = np.abs(law.nearest(x - e * along).curvature - law.nearest(x + e * along).curvature) < 1e-3
         assert smooth.sum() > 3
         assert (law.motion(x, old).along @ along)[smooth] == pytest.approx(slope[smooth], abs=1e-7)
-
-
-def test_a_step_back_along_the_path_is_shortened(monkeypatch):
-    true, asked = path_following.was_passed, []
-
-    def at_first(*args):
-        asked.append(args)
-        return len(asked) == 3 or true(*args)
-    plain = fx.trace(treloar((6, 1)), until=fx.pole_stretch(2.0), progress=False)
-    monkeypatch.setattr(path_following, "was_passed", at_first)
-    path = fx.trace(treloar((6, 1)), until=fx.pole_stretch(2.0), progress=False)
-    assert path.counts.failures == plain.counts.failures + 1
-    assert path["pressure"][-1] == pytest.approx(plain["pressure"][-1], rel=1e-9)
 
 
 def test_a_reactivated_tool_starts_without_contact_history():

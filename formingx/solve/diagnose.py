@@ -222,8 +222,8 @@ def not_reached(record: Any, states: Sequence[State], targets: Any, why: str, di
     at = f", at {record.describe(states[best])}" * (states[best] is not record.last)
     return ConvergenceError(
         f"{f'Stage {record.stage!r}: ' * bool(record.stage)}{targets.until} was not reached: {why} The nearest"
-        f" value was {targets.values[best]:.6g}{at}.{limits_passed(record.curve.problem, states)} The last good state is"
-        f" {record.describe(record.last)}; it is kept in the error's `path`.{hint * (not diagnosis.advice)}",
+        f" value was {targets.values[best]:.6g}{at}.{limits_passed(record.curve.problem, states)} The last good state"
+        f" is {record.describe(record.last)}; it is kept in the error's `path`.{hint * (not diagnosis.advice)}",
         diagnosis=diagnosis)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import contextlib
-from collections.abc import Callable, Hashable, Iterator
+from collections.abc import Callable, Hashable
 from dataclasses import dataclass
 from typing import NamedTuple, Protocol
 
@@ -26,8 +25,6 @@ class Newton:
         displacement_floor: number that is added to the norm of the displacements in the relative correction,
             dimensionless. On a tool whose force grows as the square of the penetration, corrections near the reference
             configuration are as large as displacements.
-        history_settling: largest number of iterations while the active set changes, in place of `Tolerances.settling`.
-            It holds for contact with history variables in a step that is repeated with a smaller length if it fails.
         small_correction: size of a correction (dimensionless displacement) below which growing corrections are no sign
             of divergence while the active set changes.
         exempt_iterations: largest number of iterations that do not count in `Tolerances.settling`. Each is an
@@ -47,7 +44,6 @@ class Newton:
 
     force_floor: float = 1e-5
     displacement_floor: float = 1e-2
-    history_settling: int = 16
     small_correction: float = 1e-3
     exempt_iterations: int = 160
     max_cycles: int = 8
@@ -66,17 +62,15 @@ class ActiveSetChanges:
 
     Attributes:
         changed: number of the iteration in which the active set changed last, counted from 0.
-        share: factor of the next correction, halved (to 1/4 at least) when an earlier active set returns, as full
-            corrections would cycle.
         found: number of small corrections that led to a new active set, for `Newton.exempt_iterations`.
         returns: number of returns to an earlier active set.
     """
 
     def __init__(self, problem: Equations, small: float):
         self._problem, self._small, self._iteration = problem, small, -1
-        self._seen: dict[Hashable, int] = {}
+        self._seen: set[Hashable] = set()
         self._last: Hashable = None
-        self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
+        self.changed, self.found, self.returns = 0, 0, 0
 
     def compare(self, moved: float) -> None:
         """Compare the active set with earlier ones, once after each residual.
@@ -88,13 +82,10 @@ class ActiveSetChanges:
         if now != self._last and self._last is not None:
             self.changed = self._iteration
             if now in self._seen:
-                self.share = max(self.share / 2, 0.25)
                 self.returns += 1
             else:
                 self.found += moved < self._small and not self._problem.history.path_dependent
-        elif self._iteration > self.changed + 1:
-            self.share = 1.0
-        self._seen[now] = self._iteration
+        self._seen.add(now)
         self._last = now
 
 
@@ -291,21 +282,8 @@ class BorderedNewton:
         new = problem.x.duplicate
         self.F, self.F_control, self.gradient, self.a, self.b = new(), new(), new(), new(), new()
         self.reached = 0.0, 0.0
-        self._limited = False
         self._update: Update | None = None                  # of solutions, to a tangent that is not factorised
         self._modified = ModifiedNewton(self.settings)
-
-    @contextlib.contextmanager
-    def limited_settling(self, limited: bool) -> Iterator[None]:
-        """Return a context in which, if `limited`, contacts with history variables may settle for few iterations only.
-
-        Their number is `Newton.history_settling`.
-        """
-        self._limited = limited and self.problem.history.path_dependent
-        try:
-            yield
-        finally:
-            self._limited = False
 
     def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> bool:
         """Factorise dF/dx at a solution, store dx/dcontrol in `b`, and return False if dF/dx is singular.
@@ -388,17 +366,16 @@ class BorderedNewton:
             if not self._solve(x, control, chord, rescale=not history):
                 raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
-            share = active.share
             if points and active.changed == len(history) != self.settings.uncorrected_iteration:
                 border = BorderedTangent(self.gradient, self.b, self._slope)
-                step, share = points.correct(self.solver, self.a, step, border), 1.0
+                step = points.correct(self.solver, self.a, step, border)
                 if points.failed == 2 and problem.history.path_dependent:
                     raise Failure("contact does not settle: no combination of touching, sticking and sliding is"
                                   " in equilibrium at the points that change", history)
             work = abs(self.F.dot(self.a))
             work0 = work0 or work or 1.0
-            x.axpy(share, self.a)
-            control += share * step
+            x.axpy(1.0, self.a)
+            control += step
             moved = self._norm(self.a, step)
             correction = moved / (self._norm(x, control) + self.settings.displacement_floor)
             if not np.isfinite(correction):
@@ -426,8 +403,7 @@ class BorderedNewton:
         if active.returns >= settings.max_cycles:
             raise Failure("contact does not settle: the same points change between open, sticking and sliding"
                           " over and over", history)
-        most = min(self.tolerances.settling, settings.history_settling) if self._limited else self.tolerances.settling
-        settling = len(history) - min(active.found, settings.exempt_iterations) >= most
+        settling = len(history) - min(active.found, settings.exempt_iterations) >= self.tolerances.settling
         if len(quiet) >= self.tolerances.iterations or settling:
             unsettled = settling and len(history) - active.changed < 3
             where = "contact does not settle: " * unsettled

@@ -25,7 +25,7 @@ from .equations import Array, Attempt, Quantity
 from .newton import Failure, fixed, tangents
 from .progress import Progress, RunTargets
 from .record import InadmissibleState, Record
-from .snap_through import JumpRules, SnapThrough, at_limit_points, snaps, was_passed
+from .snap_through import JumpRules, SnapThrough, at_limit_points, snaps
 from .state import State
 from .stepping import Cutback, StepControl, TimeError
 
@@ -259,13 +259,12 @@ class Run:
         bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
         smooth = not self.problem.contact.faces
         earlier = predictor.parabola_state(self.states, reach, self.curve.distance) if smooth else None
-        with self.curve.newton.limited_settling(length > self.settings.snap_through.lengths[0]):
-            if target is not None and quantity is not None:
-                new = self.curve.step_to(old, reach, quantity.equation(target.value), self._predictor, earlier, bend)
-            elif end is not None:
-                new = self.curve.step_to(old, reach, fixed(end), self._predictor, earlier, bend, kind="step")
-            else:
-                new = self.curve.step(old, length, self._predictor, earlier, bend)
+        if target is not None and quantity is not None:
+            new = self.curve.step_to(old, reach, quantity.equation(target.value), self._predictor, earlier, bend)
+        elif end is not None:
+            new = self.curve.step_to(old, reach, fixed(end), self._predictor, earlier, bend, kind="step")
+        else:
+            new = self.curve.step(old, length, self._predictor, earlier, bend)
         if target is not None:
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _PassedState("the target was met on a distant part of the path", [])
@@ -276,8 +275,6 @@ class Run:
             raise Cutback(rejection.reason, part) if rejection.fraction else _PassedState(rejection.reason, [])
         if self._jumps.rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
-        if was_passed(self.curve, self.states[:-1], old, new):
-            raise _PassedState("the iteration fell back to a part of the path that was passed already", [])
         self._orientation.check(old, new)
         error, variables = self._error_in_time(new), self.problem.history.variables
         try:

@@ -232,8 +232,7 @@ class _Motion:
         vanished; with history variables the position then counts as the state.
         """
         try:
-            with self.curve.newton.limited_settling(True):        # after a failure, the viscous motion continues
-                state = self.curve.solve(self.state.x, self.control, fixed(self.control), "jump", self.state)
+            state = self.curve.solve(self.state.x, self.control, fixed(self.control), "jump", self.state)
         except Failure:
             if self.unbalanced > self._settings.equilibrium_force:
                 self.settles, self.trial_force = False, 0.3 * self.unbalanced
