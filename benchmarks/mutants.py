@@ -96,6 +96,7 @@ MUTANTS = [Mutant(*row) for row in [
      "expansion"),
     ("values/temperature.py", "self.c1 * (above - self.c2) / above", "self.c1 * above / above",
      "temperature materials"),
+    ("contact/step_limit.py", "return bool(np.all(found > 0))", "return False", "contact"),
     # solution path
     ("solve/path_following.py", "if (limit.control - old.control) * old.slope < 0:", "if False:", "treloar"),
     ("solve/path_following.py", "if error > self.settings.max_time_error:", "if False:", "steps_in_time time accuracy"),

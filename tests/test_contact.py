@@ -476,3 +476,14 @@ def test_open_points_do_not_depend_on_closed_ones(mu, pulls):
         assert np.array_equal(getattr(alone, name), getattr(beside, name)[:-1])
     for a, b in zip(alone.history, beside.history, strict=True):
         assert np.array_equal(a, b[:-1])
+
+
+def test_points_that_lift_off_while_others_come_into_contact_shorten_the_step():
+    """A strip on a round punch that sticks: without the rule 5 states with walls .8 % off those of short steps."""
+    def wall(**options):
+        punch = fx.Contact("top", fx.tools.sphere(radius=12.0, z=0.34), "stick", direction=(0, -1))
+        scene = fx.Scene(mesh=fx.mesh.disc(radius=28.0, thickness=0.34, elements=(20, 1)), kinematics=fx.PlaneStrain(),
+                         materials=fx.Gent(mu=0.12, Jm=60.0), contacts=[punch],
+                         supports=[fx.Symmetry("axis"), fx.SimplySupported("rim")])
+        return fx.trace(scene, until=fx.travel(8.2), progress=False, **options).profile().thickness
+    assert wall() == pytest.approx(wall(step=fx.StepControl(length=0.01, largest=0.01)), rel=1e-3)
