@@ -1,5 +1,7 @@
 """Moulds of several parts in three dimensions: intersections, half moulds, pressure on a part, capacity, pinch-off."""
 
+import re
+
 import numpy as np
 import pytest
 from test_tubes import CAPPED, SYMMETRIES, scene
@@ -36,13 +38,36 @@ def test_edge_of_an_intersection_of_normal_planes_is_an_exact_fillet():
     assert edge.signed_distance(away) == pytest.approx(0 * angle - 0.5, abs=1e-12)
 
 
-def test_derivatives_of_an_intersection_are_difference_quotients():
+def side(along):
+    """The section of the bottle's body, extruded along an axis."""
+    line = [(0, -16), (10, -16), (35, -46), (35, -180), (0, -180)]
+    return fx.tools.extruded(fx.Tool(line, [0, 0, 12, 10, 0]), along=along)
+
+
+ROUNDED = fx.tools.union(side("x"), side("y"), fillet=12.0)
+
+
+def test_edge_of_a_union_of_normal_planes_is_an_exact_fillet():
+    """The concave edge of a wall x > 0 and a floor z < 0: a quarter of a cylinder in front of it."""
+    wall = fx.tools.extruded(fx.Tool([(0.0, 50.0), (0.0, -50.0)]))
+    floor = fx.tools.extruded(fx.Tool([(50.0, 0.0), (-50.0, 0.0)]))
+    edge, angle = fx.tools.union(wall, floor, fillet=3.0), np.linspace(0.1, 1.4, 7)
+    for radius in (3.0, 2.0, 3.4):
+        points = np.column_stack([-3 + radius * np.cos(angle), 0 * angle, 3 - radius * np.sin(angle)])
+        assert edge.signed_distance(points) == pytest.approx(0 * angle + radius - 3, abs=1e-12)
+    assert edge.signed_distance([[-9.0, 0, 1.0], [-1.0, 0, 9.0]]).tolist() == [-1.0, -1.0]
+    with pytest.raises(fx.InputError, match="union: fillet"):
+        fx.tools.union(wall, floor, fillet=-1.0)
+
+
+@pytest.mark.parametrize("tool", [BOTTLE, ROUNDED])
+def test_derivatives_of_rounded_tools_are_difference_quotients(tool):
     x = np.random.default_rng(3).uniform((-30, -30, -60), (30, 30, -2), (400, 3))
-    x = x[np.abs(BOTTLE.signed_distance(x)) < 8]
-    found, h = BOTTLE.distances(x), 1e-5
+    x = x[np.abs(tool.signed_distance(x)) < 8]
+    found, h = tool.distances(x), 1e-5
     steps = h * np.eye(3)
-    gradient = np.stack([(BOTTLE.signed_distance(x + e) - BOTTLE.signed_distance(x - e)) / (2 * h) for e in steps], 1)
-    hessian = np.stack([(BOTTLE.distances(x + e).normal - BOTTLE.distances(x - e).normal) / (2 * h) for e in steps], 2)
+    gradient = np.stack([(tool.signed_distance(x + e) - tool.signed_distance(x - e)) / (2 * h) for e in steps], 1)
+    hessian = np.stack([(tool.distances(x + e).normal - tool.distances(x - e).normal) / (2 * h) for e in steps], 2)
     smooth = np.abs(hessian).max((1, 2)) < 1.0                                  # not across an edge
     assert smooth.mean() > 0.95
     assert np.abs(found.normal - gradient)[smooth].max() < 1e-6
@@ -241,6 +266,28 @@ def test_programme_of_the_wall_gives_the_wanted_minimum_wall():
     assert found.path.part().volume < 4.3e4 and "wanted minimum wall" in str(found)
     with pytest.raises(fx.InputError, match="start = 9.0: must be from"):
         fx.wall_programme(build, 0.7, start=9.0, low=1.0, high=6.0)
+
+
+def test_a_sharp_ridge_is_named_before_a_sheet_slides():
+    """The shoulder of a square bottle is narrower than the centres of its corners: its sides meet sharply."""
+    mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(40, 10), part="quarter", end="closed")
+    scenes = {friction: blown(mesh, [fx.Clamped("neck")], tool, friction=friction)[0]
+              for friction, tool in ((0.3, fx.tools.half(BOTTLE).moved(x=2.0)), ("stick", BOTTLE))}
+    (found,) = [f for f in fx.check(scenes[0.3]).findings if "sharp ridge" in f.text]
+    ends = np.array([[float(v) for v in place.split(", ")] for place in re.findall(r"\((-?\d[^()]*)\)", found.text)])
+    assert found.severity == "serious" and "corner = 21.67" in found.text
+    assert ends[:, 0] - 2 == pytest.approx(ends[:, 1]) and 12 < ends[0, 1] < 14 and 21.5 < ends[1, 1] < 23
+    assert ends[:, 2] == pytest.approx(-16 - 1.2 * (ends[:, 1] - 10), abs=0.02)             # of the profile
+    assert not [f for f in fx.check(scenes["stick"]).findings if "ridge" in f.text]
+
+
+@pytest.mark.thorough
+def test_melt_slides_into_a_square_bottle_whose_ridges_have_fillets():
+    """The bottle of the demos with all edges round: with a sharp ridge the run ends at three fifths of the volume."""
+    tool = fx.tools.intersection(ROUNDED, NECK, fillet=4.0)
+    mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(40, 10), part="quarter", end="closed")
+    path = run(blown(mesh, [fx.Clamped("neck")], tool, friction="none"))
+    assert path.filling("mould").touching[-1] > 0.98 and path.part().min_wall == pytest.approx(0.478, rel=0.02)
 
 
 @pytest.mark.slow

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...errors import InputError, check_name, check_type, finite, non_negative
 from .bodies import merged
+from .edge_fillets import rounded_distances, rounded_minimum
 from .lagged_friction import Distances
 from .solid_tool import SolidTool
 from .surface_mesh import positive_part
@@ -70,31 +71,11 @@ class Intersection(SolidTool):
     def _distances(self, x):
         """Return distances, normals and Hessians at positions x relative to the unmoved tool, shape (n, 3), length."""
         a, b = (tool.distances(x) for tool in (self.first, self.second))
-        u, v = (np.maximum(self.fillet - part.distance, 0.0) for part in (a, b))
-        nearer = (a.distance <= b.distance)[:, None]
-        s = np.hypot(u, v)
-        blended = (u > 0) & (v > 0)
-        normal = np.where(nearer, a.normal, b.normal)
-        hessian = np.where(nearer[..., None], a.hessian, b.hessian)
-        if blended.any():
-            k = blended
-            p, q = (u / np.maximum(s, 1e-300))[k, None], (v / np.maximum(s, 1e-300))[k, None]
-            n = p * a.normal[k] + q * b.normal[k]
-            outer = [w[:, :, None] * w[:, None] for w in (a.normal[k], b.normal[k], n)]
-            normal[k] = n
-            hessian[k] = (p[..., None] * a.hessian[k] + q[..., None] * b.hessian[k]
-                          - (outer[0] + outer[1] - outer[2]) / s[k, None, None])
-        return Distances(self._combined(a.distance, b.distance), normal, hessian)
-
-    def _combined(self, a: np.ndarray, b: np.ndarray) -> np.ndarray:
-        """Return the signed distance for the signed distances from both tools, shape (n,), length."""
-        R = self.fillet
-        return np.maximum(R, np.minimum(a, b)) - np.hypot(np.maximum(R - a, 0.0), np.maximum(R - b, 0.0)) if R else (
-            np.minimum(a, b))
+        return rounded_distances(a, b, self.fillet)
 
     def _distance(self, x):
         """Return the signed distances from the unmoved tool, positive inside, shape (n,), length."""
-        return self._combined(self.first.signed_distance(x), self.second.signed_distance(x))
+        return rounded_minimum(self.first.signed_distance(x), self.second.signed_distance(x), self.fillet)
 
     def _surface(self):
         """Return vertices, shape (n, 3), length, and vertex numbers of triangles, shape (m, 3), of the unmoved tool."""

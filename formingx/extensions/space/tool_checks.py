@@ -9,18 +9,23 @@ from ...findings import Finding, percent, register
 from ...ranks import gathered
 from ...tools.pieces import Arc
 from ...values.tolerances import LARGE_ERROR
+from .intersection import Intersection
 from .passed_tools import surface_points
 from .solid_tool import Swept
 from .triangulated import Triangulated
 from .union import Union
 
 _FILLET_SHARE = 2e-3       # of the points of a tool over the sheet, from which on a concave fillet is reported
+_RIDGE, _RIDGE_POINTS = 0.02, 41                            # smallest relative size of a ridge; points on a piece
+_ON_SURFACE = 5e-3         # of a point from the tool, over its size
 _COARSE_WALL = 0.02        # error of the volume of a sheet by its triangles that is reported
 
 
 def _parts(tool: Any) -> list[Any]:
-    """Return the parts of a union, or the tool itself, as a list."""
-    return [part.moved(*tool.shift) for part in tool.parts] if isinstance(tool, Union) else [tool]
+    """Return the parts of unions and intersections of tools, or the tool itself, as a list."""
+    parts = tool.parts if isinstance(tool, Union) else [tool.first, tool.second] if isinstance(
+        tool, Intersection) else []
+    return [piece for part in parts for piece in _parts(part.moved(*tool.shift))] if parts else [tool]
 
 
 def files_of(tool: Any) -> list[Triangulated]:
@@ -93,6 +98,47 @@ def _smallest_fillet(tool: Any, nodes: np.ndarray | None, length: float) -> tupl
     if not small.mean() > _FILLET_SHARE:
         return np.inf, None
     return 1 / float(np.median(bend[small])), points[i[kept][int(np.argmax(bend))]]
+
+
+@register("start")
+def sharp_ridges(body: Any) -> Iterator[Finding]:
+    """Yield a finding for each contact that slides into a sharp ridge between the sides of a tool round a rectangle.
+
+    The sides meet sharply where the profile is narrower than the corners: the normal of the tool jumps there.
+    """
+    for contact in body.scene.contacts:
+        if contact.lagged and not contact.sticks:
+            for part in _parts(contact.tool):
+                if not isinstance(part, Swept) or part.kind != "box":
+                    continue
+                places = ridge(part, contact.tool)
+                if len(places):
+                    ends = " to ".join(f"({', '.join(f'{v:.4g}' for v in place)})" for place in places[[0, -1]])
+                    yield Finding("serious", repr(contact), f"its sides meet at a sharp ridge from (x, y, z) = {ends}."
+                                  f" A sheet that slides stops where a node meets it. Round it: corner ="
+                                  f" {min(part.half) - _inner_radius(places, part):.4g} or more, or take the union of"
+                                  f" two extruded profiles, fx.tools.union(a, b, fillet=...), with a fillet above the"
+                                  f" size of the triangles")
+
+
+def ridge(part: Swept, tool: Any) -> np.ndarray:
+    """Return points on the ridge of a cavity round a rectangle, those on the surface of the whole tool, (k, 3), length.
+    """
+    inner = min(part.half) - part.corner
+    points = part.profile.outline()
+    s = np.linspace(0.0, 1.0, _RIDGE_POINTS)[:, None]
+    line = np.concatenate([(1 - s) * a + s * b for a, b in zip(points[:-1], points[1:])])
+    normal = part.profile.nearest(line).normal
+    line = line[(line[:, 0] < (1 - _RIDGE) * inner) & (line[:, 0] > 0) & (normal[:, 0] > _RIDGE)]
+    out = np.array(part.half) - part.corner + line[:, :1] - inner
+    found = np.column_stack([out, line[:, 1]]) + part.shift
+    near = _ON_SURFACE * np.ptp(points, axis=0).max()
+    return found[np.abs(tool.signed_distance(found)) < near]
+
+
+def _inner_radius(places: np.ndarray, part: Swept) -> float:
+    """Return the smallest profile coordinate r of points on a ridge, shape (k, 3), length."""
+    return float(places[:, 0].min() - part.shift[0] - part.half[0] + min(part.half))
 
 
 @register("start")

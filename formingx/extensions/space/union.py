@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import reduce
 from typing import Any
 
 import numpy as np
 
-from ...errors import InputError, as_list, check_type
+from ...errors import InputError, as_list, check_type, non_negative
+from .edge_fillets import complement, rounded_distances, rounded_minimum
 from .solid_tool import SolidTool, nearest_of
 
 
@@ -15,19 +17,21 @@ class Union(SolidTool):
     """Union of several rigid solids, which are one tool with one contact.
 
     The signed distance is the largest of the distances from the parts, positive inside. It is exact outside. Where two
-    parts meet, their common surface is sharp.
+    parts meet, their common surface is sharp, or has a fillet.
 
     Args:
         parts: the solids; each may be moved.
         names: name of each part, in reports and tables.
+        fillet: radius of the edges where parts meet, length.
 
     Attributes:
         parts: the solids.
         names: their names.
+        fillet: radius of the edges where parts meet, length.
     """
 
-    def __init__(self, parts: Sequence[SolidTool], names: Sequence[str]):
-        self.parts, self.names = list(parts), list(names)
+    def __init__(self, parts: Sequence[SolidTool], names: Sequence[str], fillet: float = 0.0):
+        self.parts, self.names, self.fillet = list(parts), list(names), fillet
         self.sized = all(part.sized for part in parts)
 
     def nearest_parts(self, x: np.ndarray) -> np.ndarray:
@@ -37,11 +41,15 @@ class Union(SolidTool):
 
     def _distance(self, x):
         """Return the signed distances from the unmoved tool, positive inside, shape (n,), length."""
-        return np.max([part.signed_distance(x) for part in self.parts], axis=0)
+        found = [part.signed_distance(x) for part in self.parts]
+        return -reduce(lambda a, b: rounded_minimum(a, -b, self.fillet), found[1:], -found[0]) if self.fillet else (
+            np.max(found, axis=0))
 
     def _distances(self, x):
         """Return distances, normals and Hessians at positions x relative to the unmoved tool, shape (n, 3), length."""
-        return nearest_of([part.distances(x) for part in self.parts])
+        found = [part.distances(x) for part in self.parts]
+        return complement(reduce(lambda a, b: rounded_distances(a, b, self.fillet), map(
+            complement, found))) if self.fillet else nearest_of(found)
 
     def _surface(self):
         """Return vertices, shape (n, 3), length, and vertex numbers of triangles, shape (m, 3), of the unmoved tool."""
@@ -50,10 +58,10 @@ class Union(SolidTool):
         return np.concatenate(points), np.concatenate([part + k for part, k in zip(triangles, begin)])
 
     def __repr__(self) -> str:
-        return f"union({', '.join(map(repr, self.parts))})"
+        return f"union({', '.join(map(repr, self.parts))}{f', fillet={self.fillet:g}' if self.fillet else ''})"
 
 
-def union(*parts: SolidTool, names: Sequence[str] | None = None) -> Union:
+def union(*parts: SolidTool, names: Sequence[str] | None = None, fillet: float = 0.0) -> Union:
     """Return one rigid tool that consists of several solids, such as a box with a rib, or two halves of a mould.
 
     A face of a sheet must have one contact with all parts of a mould. With a contact for each part, a point that one
@@ -62,6 +70,7 @@ def union(*parts: SolidTool, names: Sequence[str] | None = None) -> Union:
     Args:
         parts: the solids, such as `fx.tools.box(...)` and `fx.tools.solid("rib.stl")`.
         names: name of each part, in reports and tables; default "part 1", "part 2" and so on.
+        fillet: radius of the concave edges where parts meet, length. The drawn surface has none.
 
     Returns:
         The tool.
@@ -82,4 +91,4 @@ def union(*parts: SolidTool, names: Sequence[str] | None = None) -> Union:
         check_type("union: names: name", word, str, "a word")
     if len(words) != len(solids) or len(set(words)) < len(words):
         raise InputError(f"union: names = {words!r}: must be one for each of the {len(solids)} parts, and each another")
-    return Union(solids, words)
+    return Union(solids, words, non_negative("union: fillet", fillet))
