@@ -17,7 +17,7 @@ PICTURES, THUMBNAILS = DOCS.parent / "demos" / "pictures", DOCS / "thumbnails"
 WIDTH, COLOURS, MARGIN = 480, 96, 6                            # pixels, colours, pixels
 PANELS = {
     "balloon": (0, 0, 1 / 3, 1), "bottle_3_to_1": (0, 0, 0.31, 1), "chilling": (0.5, 0, 1, 0.5),
-    "clamp_ring": (0.64, 0, 1, 1), "closing_halves": (0, 0, 1, 1),
+    "clamp_ring": (0.64, 0, 1, 1), "closing_halves": (0.5, 0, 1, 1),
     "cold_plug": (0.635, 0, 1, 1), "compression_grids": (0, 0.725, 1, 1),
     "contact_convergence": (0.667, 0, 1, 1), "cup_adapted": (0, 0, 0.5, 1), "even_bottle": (0, 0, 0.5, 1),
     "even_disc": (0, 0, 0.5, 1), "even_pot": (0, 0, 0.5, 1), "even_trough": (0, 0, 0.5, 1),
@@ -27,6 +27,7 @@ PANELS = {
     "oven": (0, 0, 0.49, 1), "plug_adapted": (0, 0, 0.5, 1), "plug_friction": (0, 0, 0.5, 1),
     "plug_stress_held": (0, 0.04, 0.33, 0.515), "pot_study": (0, 0, 1 / 3, 1), "relaxation": (0, 0, 0.32, 1),
     "relaxing_pot": (0.5, 0, 1, 1), "setting_pot": (0, 0, 0.49, 1),
+    "stretch_blow": (0.7, 0, 1, 1),
     "viscoelastic_disc": (0, 0, 0.325, 1), "viscoelastic_tube": (0, 0, 0.49, 1),
 }
 """Panel of each picture: left, top, right, bottom, in parts of its width and height."""
