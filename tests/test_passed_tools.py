@@ -8,7 +8,8 @@ from conftest import run_json
 
 import formingx as fx
 from formingx.extensions.space.lagged_steps import LaggedApproach
-from formingx.extensions.space.passed_tools import surface_points
+from formingx.extensions.space.passed_tools import _C, far_off, surface_points
+from formingx.extensions.space.surface_mesh import closest_points
 
 MATERIAL = fx.NeoHookean(c10=1.0)
 HELD = [fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")]
@@ -166,3 +167,18 @@ if path.problem.comm.rank == 0:
 """
     one, two = run_json(script, 1), run_json(script, 2)
     assert two == pytest.approx(one, rel=1e-9) and one[-1] < 8.0
+
+
+def test_far_points_and_nearest_triangles_are_those_of_all_pairs():
+    rng = np.random.default_rng(5)
+    x, points, distance = rng.uniform(size=(200, 3)), rng.uniform(size=(30, 3)), 0.2
+    assert far_off(x, points, distance).tolist() == [
+        bool(np.linalg.norm(points - y, axis=1).min() > distance) for y in x]
+    assert far_off(x, points[:0], 1.0).all() and far_off(x[:0], points, 1.0).shape == (0,)
+    cells = np.array([rng.choice(30, 3, replace=False) for _ in range(40)])
+    depth, longest, nearest = np.empty(200), np.empty(200), np.empty(200, dtype=int)
+    _C.distances(200, x, 40, points, cells, np.empty((40, 4)), depth, longest, nearest)
+    _, rows, away = closest_points(x, points[cells])
+    edges = points[cells] - np.roll(points[cells], 1, axis=1)
+    assert depth == pytest.approx(away) and np.array_equal(nearest, rows)
+    assert longest == pytest.approx(np.linalg.norm(edges, axis=2).max(1)[rows])

@@ -42,24 +42,63 @@ void crossings(long n, const double *x, long m, const double *P, const long *tri
     }
 }
 
-/* distance of n points x (n, 3) from the nearest of m triangles (m, 3) with corners P, and its longest edge */
-void distances(long n, const double *x, long m, const double *P, const long *triangles, double *distance,
-               double *longest, long *nearest)
+/* square distance of a point p from triangle t */
+static double from_triangle(const double *p, const double *P, const long *triangles, long t)
+{
+    const double *c[3];
+    double u, v, y[3], r[3];
+    for (int i = 0; i < 3; i++) c[i] = P + 3 * triangles[3 * t + i];
+    flat(c[0], c[1], c[2], p, &u, &v);
+    for (int i = 0; i < 3; i++) y[i] = u * c[0][i] + v * c[1][i] + (1 - u - v) * c[2][i];
+    return away(y, p, r);
+}
+
+/* distance of n points x (n, 3) from the nearest of m triangles (m, 3) with corners P, its longest edge and its number;
+   `spheres` (m, 4) has room for centre and radius of the triangles */
+void distances(long n, const double *x, long m, const double *P, const long *triangles, double *spheres,
+               double *distance, double *longest, long *nearest)
+{
+    double r[3];
+    for (long t = 0; t < m; t++) {
+        double *s = spheres + 4 * t, square = 0;
+        for (int i = 0; i < 3; i++)
+            s[i] = (P[3 * triangles[3 * t] + i] + P[3 * triangles[3 * t + 1] + i] + P[3 * triangles[3 * t + 2] + i]) / 3;
+        for (int i = 0; i < 3; i++) square = fmax(square, away(P + 3 * triangles[3 * t + i], s, r));
+        s[3] = sqrt(square);
+    }
+    for (long k = 0; k < n; k++) {
+        const double *p = x + 3 * k, *c[3];
+        long best = 0;
+        double least = 1e300;
+        for (long t = 0; t < m; t++) {
+            double square = away(spheres + 4 * t, p, r);
+            if (square < least) { least = square; best = t; }
+        }
+        least = from_triangle(p, P, triangles, best);
+        double root = sqrt(least);
+        for (long t = 0; t < m; t++) {
+            double reach = root + spheres[4 * t + 3];
+            if (away(spheres + 4 * t, p, r) >= reach * reach) continue;
+            double square = from_triangle(p, P, triangles, t);
+            if (square < least) { least = square; root = sqrt(least); best = t; }
+        }
+        for (int i = 0; i < 3; i++) c[i] = P + 3 * triangles[3 * best + i];
+        longest[k] = sqrt(fmax(away(c[0], c[1], r), fmax(away(c[1], c[2], r), away(c[2], c[0], r))));
+        distance[k] = root;
+        nearest[k] = best;
+    }
+}
+
+/* is each of n points x (n, 3) farther than a distance from all m points P (m, 3)? `found` (n) is 1 or 0 */
+void far_off(long n, const double *x, long m, const double *P, double distance, long *found)
 {
     for (long k = 0; k < n; k++) {
-        double best = 1e300, r[3];
-        for (long t = 0; t < m; t++) {
-            const double *c[3], *p = x + 3 * k;
-            double u, v, y[3];
-            for (int i = 0; i < 3; i++) c[i] = P + 3 * triangles[3 * t + i];
-            flat(c[0], c[1], c[2], p, &u, &v);
-            for (int i = 0; i < 3; i++) y[i] = u * c[0][i] + v * c[1][i] + (1 - u - v) * c[2][i];
-            double f = away(y, p, r);
-            if (f >= best) continue;
-            best = f;
-            nearest[k] = t;
-            longest[k] = sqrt(fmax(away(c[0], c[1], r), fmax(away(c[1], c[2], r), away(c[2], c[0], r))));
+        const double *p = x + 3 * k;
+        double square = distance * distance;
+        found[k] = 1;
+        for (long j = 0; j < m; j++) {
+            double a = P[3 * j] - p[0], b = P[3 * j + 1] - p[1], c = P[3 * j + 2] - p[2];
+            if (a * a + b * b + c * c <= square) { found[k] = 0; break; }
         }
-        distance[k] = sqrt(best);
     }
 }

@@ -13,7 +13,6 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..._jit import CFunctions
-from ...mesh.nodes import nearest
 from .surface_sides import SurfaceSides
 
 _C = CFunctions("extensions/space/crossings.c")
@@ -91,16 +90,15 @@ class PassedTool:
             return None
         outside, met = sides.outside(x, P, shift[2])
         wrong = np.flatnonzero(met & (outside != self._faces_out))
-        if len(wrong):
-            wrong = wrong[nearest(P, x[wrong])[0] > limit * self._size]
-        if len(wrong) and len(sides.edge):                    # at its edge, the sheet is not continued
-            wrong = wrong[nearest(P[sides.edge], x[wrong])[0] > self._size]
+        wrong = wrong[far_off(x[wrong], P, limit * self._size)]
+        wrong = wrong[far_off(x[wrong], P[sides.edge], self._size)]           # at its edge, the sheet is not continued
         if not len(wrong):
             return None
         wrong = wrong[:: max(len(wrong) // _MOST_COMPARED, 1)]
         depth, longest, triangle = np.zeros(len(wrong)), np.zeros(len(wrong)), np.zeros(len(wrong), dtype=np.int64)
         x = np.ascontiguousarray(x[wrong])
-        _C.distances(len(x), x, len(self._cells), P, self._cells, depth, longest, triangle)
+        _C.distances(len(x), x, len(self._cells), P, self._cells, np.empty((len(self._cells), 4)), depth, longest,
+                     triangle)
         ratio, bridged = depth / longest, np.full(len(x), np.inf)
         if bridged_limit > 0 and (far := np.flatnonzero(ratio > limit)).size:
             travels = self._travels(x[far], P[self._cells[triangle[far]]], (bridged_limit * longest - depth)[far])
@@ -126,6 +124,13 @@ class PassedTool:
             travel[i, j] += np.maximum(gap, close)
             moves[i, j] = (gap > close) & (travel[i, j] < most[i])
         return np.where((travel < most[:, None]) & ~moves, travel, np.inf).max(1)
+
+
+def far_off(x: np.ndarray, points: np.ndarray, distance: float) -> np.ndarray:
+    """Return the mask of positions x, shape (n, 3), farther than a distance from all points, shape (m, 3), length."""
+    found = np.empty(len(x), dtype=int)
+    _C.far_off(len(x), x, len(points), points, distance, found)
+    return found > 0
 
 
 def surface_points(tool: Any, spacing: float, nodes: np.ndarray, margin: float) -> np.ndarray:
