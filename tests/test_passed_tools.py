@@ -178,7 +178,8 @@ def test_far_points_and_nearest_triangles_are_those_of_all_pairs():
     cells = np.array([rng.choice(30, 3, replace=False) for _ in range(40)])
     depth, longest, nearest = np.empty(200), np.empty(200), np.empty(200, dtype=int)
     _C.distances(200, x, 40, points, cells, np.empty((40, 4)), depth, longest, nearest)
-    _, rows, away = closest_points(x, points[cells])
+    away = closest_points(x, points[cells])[2]
     edges = points[cells] - np.roll(points[cells], 1, axis=1)
-    assert depth == pytest.approx(away) and np.array_equal(nearest, rows)
-    assert longest == pytest.approx(np.linalg.norm(edges, axis=2).max(1)[rows])
+    assert depth == pytest.approx(away)
+    assert depth == pytest.approx([closest_points(y[None], points[cells[[k]]])[2][0] for y, k in zip(x, nearest)])
+    assert longest == pytest.approx(np.linalg.norm(edges, axis=2).max(1)[nearest])
