@@ -332,7 +332,10 @@ class StepLimit:
 
     Attributes:
         active_contacts: the `Approach` of each contact that is active in the current stage.
-        several_closures: True if several gaps may close in one step, in the predicted order.
+        several_closures: True if several gaps may close in one step, in the predicted order. False: each step ends at
+            the next gap closure, without prediction of contact events.
+        corrections: corrections of a solved step by contacts that open and close points between steps only; None
+            without them. The tool names their class (`formingx.extensions.space.lagged_corrections`).
         predictor: predictor of contact events, or None.
     """
 
@@ -341,6 +344,7 @@ class StepLimit:
         self._all = [getattr(face.contact.tool, "approach", Approach)(
             face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
         self.active_contacts: list[Approach] = []
+        self.corrections: Any = None
         self.several_closures = not problem.scene.one_node_per_step
         make = type(self).make_predictor
         self.predictor = make(self) if make else None
@@ -350,8 +354,10 @@ class StepLimit:
     ends where the gap of a sticking point closes."""
 
     def note_active(self) -> None:
-        """Set `active_contacts` after a change of the stage."""
+        """Set `active_contacts` and `corrections` after a change of the stage."""
         self.active_contacts = [approach for approach in self._all if approach.face.active]
+        lagged = [approach for approach in self.active_contacts if hasattr(approach.face.contact.tool, "corrections")]
+        self.corrections = lagged[0].face.contact.tool.corrections(lagged, self._n) if lagged else None
 
     @property
     def only_sticks(self) -> bool:
@@ -363,10 +369,6 @@ class StepLimit:
     def predicts_events(self) -> bool:
         """True if contact events after an accepted state are predicted."""
         return self.predictor is not None and self.predictor.active
-
-    def end_at_closures(self) -> None:
-        """End each further step at the next gap closure, without prediction of contact events."""
-        self.several_closures = False
 
     def length(self, trial: TrialStep) -> float:
         """Return the largest admissible arc length, at most `trial.length`, of a step along a tangent.
@@ -406,16 +408,6 @@ class StepLimit:
     def settling(self) -> int:
         """Number of Newton iterations of a step of any length that the step control does not count."""
         return max([c.settling for c in self.active_contacts], default=0)
-
-    @property
-    def corrections(self) -> Any | None:
-        """Corrections of a solved step by contacts that open and close points between steps only; None without them.
-
-        The tool of such a contact names their class (`formingx.extensions.space.lagged_corrections`).
-        """
-        found = [(c, c.face.contact.tool.corrections) for c in self.active_contacts
-                 if hasattr(c.face.contact.tool, "corrections")]
-        return found[0][1]([c for c, _ in found], self._n) if found else None
 
     def passes_through(self, old: Any, new: Any) -> bool:
         """Return True if a contact point passes through its tool between two states (`Approach.cuts_tool`)."""

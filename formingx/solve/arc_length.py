@@ -270,18 +270,14 @@ class Curve:
         return sign * high * unloaded.direction
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
-             bend: Bend | None = None) -> State:
+             bend: Bend | None = None, equation: Constraint | None = None) -> State:
         """Return the state at an arc length from `old` (Song 1993, eqs. 4.14 to 4.31); raise `Failure` without one.
-        Newton's method corrects a guess on the tangent in the plane normal to it. `earlier` bends the guess to a
-        parabola, and `bend` adds (dx, shape (n,); dcontrol)."""
-        plane = self._plane(old, *self._predicted(old, length))
-        return self._solve_from(*self._predicted(old, length, earlier, bend), plane, "step", old, predictor)
 
-    def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
-                earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the state after a step that ends where `equation` holds, such as "quantity = target", instead.
-        The other arguments and errors are those of `step`."""
-        return self._solve_from(*self._predicted(old, length, earlier, bend), equation, kind, old, predictor)
+        Newton's method corrects a guess on the tangent in the plane normal to it, or where `equation` holds, such as
+        "quantity = target". `earlier` bends the guess to a parabola, and `bend` adds (dx, shape (n,); dcontrol).
+        """
+        end = equation or self._plane(old, *self._predicted(old, length))
+        return self._solve_from(*self._predicted(old, length, earlier, bend), end, old, predictor)
 
     def _predicted(self, old: State, length: float, earlier: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
@@ -301,7 +297,7 @@ class Curve:
             control += bend[1]
         return x, control
 
-    def _solve_from(self, x: Array, control: float, constraint: Constraint, kind: str, old: State,
+    def _solve_from(self, x: Array, control: float, constraint: Constraint, old: State,
                     predictor: Predictor | None) -> State:
         """Return the state at which a constraint holds, solved for from the guess (x, control), x of shape (n,).
 
@@ -309,12 +305,12 @@ class Curve:
         gives the direction of the path, from which the limit point is located.
         """
         if predictor is None or not self._is_away_from_limit_point(old.slope):
-            return self.solve(x, control, constraint, kind, old)
+            return self.solve(x, control, constraint, "step", old)
         guess = predictor(control)
-        new = self.solve(x if guess is None else guess, control, constraint, kind, old, chords=True)
+        new = self.solve(x if guess is None else guess, control, constraint, "step", old, chords=True)
         if self._is_away_from_limit_point((new.control - old.control) / self.distance(old, new)):
             return new
-        return self.solve(new.x, new.control, constraint, kind, old)
+        return self.solve(new.x, new.control, constraint, "step", old)
 
     def _is_away_from_limit_point(self, slope: float) -> bool:
         """Return True if the control has more than half of the squared arc length; `slope`: dcontrol/ds."""

@@ -100,20 +100,15 @@ class FixedControlCurve(Curve):
         self._fixed = FixedControl(problem, tolerances)
 
     def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
-             bend: Bend | None = None) -> State:
+             bend: Bend | None = None, equation: Constraint | None = None) -> State:
         """Return the state at the control old.control + length old.slope; raise `Failure` if the iteration fails."""
-        return self._correct(old, length, "step")
-
-    def step_to(self, old: State, length: float, equation: Constraint, predictor: Predictor | None = None,
-                earlier: State | None = None, bend: Bend | None = None, kind: str = "target") -> State:
-        """Return the state at old.control + length old.slope, the target of the control; raise `Failure` without."""
-        return self._correct(old, length, kind)
+        return self._correct(old, length)
 
     def state_at_fraction(self, a: State, b: State, fraction: float) -> State:
         """Return the state at the control a.control + fraction (b.control - a.control), with a fraction from 0 to 1."""
         control = a.control + fraction * (b.control - a.control)
         if self._is_unloaded(a):                                 # a slack body has no tangent in its first state
-            return self._correct(a, (control - a.control) / a.slope, "step")
+            return self._correct(a, (control - a.control) / a.slope)
         return self.solve(self.interpolate(a, b, fraction)[0], control, fixed(control), "step", a)
 
     def destroy(self) -> None:
@@ -140,8 +135,8 @@ class FixedControlCurve(Curve):
         """
         return control * other
 
-    def _correct(self, old: State, length: float, kind: str) -> State:
-        """Return the state of a given kind at the control old.control + length old.slope.
+    def _correct(self, old: State, length: float) -> State:
+        """Return the state at the control old.control + length old.slope.
 
         Raise `Failure` if Newton's method fails, or if an element is inverted.
         """
@@ -156,7 +151,7 @@ class FixedControlCurve(Curve):
             failure.attempt = Attempt(self._x.array_r.copy(), control, self._fixed.correction(), 0.0)
             raise failure
         self.newton.tangent(self._x, control)
-        return self._state(control, history, kind, old)
+        return self._state(control, history, "step", old)
 
     @staticmethod
     def _is_unloaded(state: State) -> bool:

@@ -259,13 +259,12 @@ class Run:
         bend = limit.prepare(self._trial._replace(length=reach), ends=True) if limit else None
         smooth = not self.problem.contact.faces
         earlier = predictor.parabola_state(self.states, reach, self.curve.distance) if smooth else None
+        equation = None if end is None else fixed(end)
         if target is not None and quantity is not None:
-            new = self.curve.step_to(old, reach, quantity.equation(target.value), self._predictor, earlier, bend)
-        elif end is not None:
-            new = self.curve.step_to(old, reach, fixed(end), self._predictor, earlier, bend, kind="step")
-        else:
-            new = self.curve.step(old, length, self._predictor, earlier, bend)
+            equation = quantity.equation(target.value)
+        new = self.curve.step(old, reach, self._predictor, earlier, bend, equation)
         if target is not None:
+            new.kind = "target"
             if not 0 < self.curve.progress(old, new) < 2 * length:
                 raise _PassedState("the target was met on a distant part of the path", [])
             new.target = target
@@ -392,7 +391,8 @@ class Run:
 
         Contacts in three dimensions open and close points between steps only.
         """
-        corrections = self.problem.contact.limit and self.problem.contact.limit.corrections
+        limit = self.problem.contact.limit
+        corrections = limit.corrections if limit else None
         if not corrections or new.kind == "limit point":
             return new
         equation = next((quantity.equation(target.value) for target, quantity in self.targets.open
