@@ -47,9 +47,9 @@ def test_unit_forces_are_added_forces(points):
         for way in range(2):
             forces = np.full(face.points.shape, np.nan)             # NaN: the law acts; away from the tool, with 0
             forces[point] = np.eye(2)[way]
-            face.apply(forces)
+            face.applied = forces
             columns.append(residual(problem, 0.1)(x) - before)
-            face.apply(None)
+            face.applied = None
     assert found.shape == (len(before), 2 * len(chosen)) and np.sum(np.abs(found).max(0) > 0.1) >= len(chosen)
     np.testing.assert_allclose(found, np.transpose(columns), atol=1e-12 * max(1.0, np.abs(before).max()))
 

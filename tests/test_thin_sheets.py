@@ -99,7 +99,7 @@ def test_a_jump_ends_after_the_iterations_of_its_step(caplog):
     """The iterations of a step bound its jumps, and the log says so."""
     path = pushed(travel=1.0)
     settings, curve = snap_through.SnapThrough(max_iterations=20), path.record.curve
-    curve.spend(21)
+    curve.iterations += 21
     with caplog.at_level(logging.INFO, "formingx"), pytest.raises(snap_through.Failure, match="more than 20 Newton"):
         snap_through.snap_through(curve, path.last, 1e-4, False, settings)
     assert "no jump within 21 Newton iterations of this step: shorter steps are tried" in caplog.text

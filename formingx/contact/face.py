@@ -194,6 +194,7 @@ class FaceContact:
         active: True if the contact is active in the stage.
         moves: True if the tool moves as the control changes, in the stage.
         shift: reduction of the signed distances from the tool after a remeshing, shape (n,), length; else None.
+        applied: dimensionless forces, shape (n, c), in the residual in place of the law, except where NaN; or None.
         unbalanced: sum of the residual at the points in contact, as a force, shape (components,), stress length^2. The
             resultant `force` is reduced by it, so that it balances the internal forces of the body. It is 0 except in
             the perturbed runs of a design sensitivity, whose changes of the gaps are below round-off.
@@ -218,7 +219,7 @@ class FaceContact:
         self.enter(0.0, float(contact.driven), True)
         self._in_tangent = np.zeros((*self.points.shape, self.points.shape[1]))  # stiffness in the last tangent
         self._guessed: np.ndarray | None = None
-        self._applied: np.ndarray | None = None             # forces in the residual in place of the law, see `apply`
+        self.applied: np.ndarray | None = None
         self._stored: FaceHistory | None = None
         self.history: ContactHistory | None = None
         self.start()
@@ -287,10 +288,6 @@ class FaceContact:
         between = self._solid.carried_forces(self, fields, control)
         return self.area[:, None] * self.tractions(fields, control).force + between
 
-    def apply(self, forces: np.ndarray | None) -> None:
-        """Set dimensionless forces, shape (n, c), that act in the residual in place of the law, except where NaN."""
-        self._applied = forces
-
     def begin(self, old: np.ndarray | None, control: float = 0.0) -> None:
         """Begin an increment from an accepted state, owned unknowns `old`; None: only evaluate states; collective."""
         if self.contact.present_area and old is not None:   # the area of a sheet grows as its wall thins
@@ -305,7 +302,7 @@ class FaceContact:
     def add_residual(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Add the contact forces in a state to the residual `values`; both with locally owned entries."""
         force = self.scale[:, None] * self.tractions(fields, control).force
-        self.add(values, force if self._applied is None else np.where(np.isnan(self._applied), force, self._applied))
+        self.add(values, force if self.applied is None else np.where(np.isnan(self.applied), force, self.applied))
 
     def linearise(self, values: np.ndarray, fields: np.ndarray, control: float) -> None:
         """Linearise the law at a state; its forces replace those of the law in `values`, shape (m,)."""

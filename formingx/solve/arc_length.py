@@ -48,6 +48,7 @@ class Curve:
         newton: solver of F = 0 with a constraint (`BorderedNewton`).
         fixed_control: True if the solver cannot pass a limit point.
         control_weight: weight w of the squared control in arc length (dimensionless).
+        iterations: number of Newton iterations since the last call of `spent`, failed attempts included.
     """
 
     fixed_control = False
@@ -56,7 +57,7 @@ class Curve:
     def __init__(self, problem: Equations, tolerances: Tolerances):
         self.problem = problem
         self.newton = BorderedNewton(problem, tolerances, self.norm)
-        self._iterations = 0
+        self.iterations = 0
         self._found: State | None = None                    # state whose tangent was factorised last
         self._one_sided_state: tuple[State | None, int] = None, 0   # state of one-sided factors; number of factors then
         self._x, self._a, self._b = (problem.x.duplicate() for _ in range(3))
@@ -91,10 +92,10 @@ class Curve:
             try:
                 _, history = self.newton.correct(self._x, 0.0, fixed(0.0))
             except Failure as failure:
-                self._iterations += len(failure.history)
+                self.iterations += len(failure.history)
                 failure.attempt = self._attempt()
                 raise
-            self._iterations += len(history) - 1
+            self.iterations += len(history) - 1
         else:
             self.problem.reference.stiff_state(self._x)
             if not self.newton.tangent(self._x, 0.0):
@@ -142,10 +143,10 @@ class Curve:
         try:
             control, history = self.newton.correct(self._x, control, constraint, before, chords)
         except Failure as failure:
-            self._iterations += len(failure.history)
+            self.iterations += len(failure.history)
             failure.attempt = self._attempt()
             raise
-        self._iterations += len(history) - 1
+        self.iterations += len(history) - 1
         if self.problem.has_inverted_element(self._x, control):               # forces of 1/J do not show the sign of J
             raise Failure("an element turned inside out", history)
         self._found = self._state(control, history, kind, before)
@@ -377,18 +378,9 @@ class Curve:
             return gradient.dot(self._b) + weight * (control - control0), weight
         return c
 
-    def spend(self, iterations: int) -> None:
-        """Count iterations of another solver, such as those with viscous forces, for the current step."""
-        self._iterations += iterations
-
-    @property
-    def iterations(self) -> int:
-        """Number of Newton iterations since the last call of `spent`, failed attempts included."""
-        return self._iterations
-
     def spent(self) -> int:
         """Return the number of iterations since the last call, failed attempts included, and count anew."""
-        spent, self._iterations = self._iterations, 0
+        spent, self.iterations = self.iterations, 0
         return spent
 
     def destroy(self) -> None:

@@ -145,7 +145,7 @@ class FixedControlCurve(Curve):
             old.x + length * old.direction)
         good = self._fixed.solve(self._x, control)
         history = self._fixed.history
-        self._iterations += len(history) - 1
+        self.iterations += len(history) - 1
         if not good or self.problem.has_inverted_element(self._x, control):
             failure = Failure("Newton's method at fixed control did not converge", history)
             failure.attempt = Attempt(self._x.array_r.copy(), control, self._fixed.correction(), 0.0)

@@ -194,9 +194,9 @@ class _Motion:
         try:
             _, history = self._newton.correct(self._x, self.control, fixed(self.control), self.state)
         except Failure as failure:
-            self.curve.spend(len(failure.history))
+            self.curve.iterations += len(failure.history)
             return self._reject()
-        self.curve.spend(len(history) - 1)
+        self.curve.iterations += len(history) - 1
         x, limit = self._x.array_r.copy(), self.problem.contact.limit
         last, new = self.state, replace(self.state, x=x, control=self.control)
         if self.problem.has_inverted_element(self._x, self.control) or limit and limit.passes_through(last, new):

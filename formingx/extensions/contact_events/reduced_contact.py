@@ -81,11 +81,11 @@ class BodyResponse:
         self._x.array_w[:] = x
         try:
             for face, given in zip(self._problem.contact.faces, forces, strict=True):
-                face.apply(given)
+                face.applied = given
             self._problem.residual(self._x, control, self._F)
         finally:
             for face in self._problem.contact.faces:
-                face.apply(None)
+                face.applied = None
         left = self._F.array_r.copy()
         left[self._problem.constrained] = 0.0
         found = self._solve(left[:, None])
