@@ -20,6 +20,7 @@ from .results.path import Path
 from .run_hooks import RunExtension, check_argument
 from .run_parts import check_start, first_path, new_path, run_errors, run_on_adapted_mesh, write_checkpoints
 from .scene import clearance, target_checks
+from .scene.contact_checks import check_travel
 from .scene.scene import Scene
 from .solve.arc_length import Curve
 from .solve.load_control import FixedControlCurve
@@ -105,7 +106,7 @@ def trace(scene: Scene, *, until: Target, intermediate: Sequence[Target] = (), s
     for target in (until, *intermediate):
         check_type("trace: target", target, Target, "a target, such as pole_stretch(3)")
         if target.name == "travel" and isinstance(scene.driven, Contact):
-            scene.check_travel(scene.driven, target.value)
+            check_travel(scene, scene.driven, target.value)
     check_type("trace: step", step, StepControl | None, "a StepControl or None")
     check_type("trace: tolerances", tolerances, Tolerances | None, "a Tolerances or None")
     check_type("trace: progress", progress, bool, "True or False")

@@ -8,6 +8,7 @@ import numpy as np
 from ..errors import InputError
 from ..physics.contact import Contact
 from ..values.tolerances import CURVE_POINTS, PIECE_POINTS
+from .contact_checks import check_travel
 from .scene import Scene
 
 
@@ -27,7 +28,7 @@ def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = Non
         for ends in _break_points(plan, travels):
             for i in (i for i in present if ends[i] != travels[i] and np.isfinite(ends[i])):
                 try:
-                    scene.check_travel(tools[i], ends[i])
+                    check_travel(scene, tools[i], ends[i])
                 except InputError as error:
                     raise InputError(f"{plan.stage.label}: {error}") from None
             _check_motion(scene, plan.stage.label, present, outlines, (travels, ends))

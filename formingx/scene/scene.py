@@ -149,7 +149,7 @@ class Scene:
         boundary_checks.check(self)
         if (planes := mirror_planes(self)).planes:
             self.symmetry = planes
-        self.check_constrained(self.supports)
+        support_checks.check_held(self, self.supports)
         self.model.check(self)
         if self.model.solid:
             support_checks.check_hinges(self)
@@ -223,14 +223,8 @@ class Scene:
                 if item.driven and self.same_tool(i)[0] == i]
 
     def same_tool(self, number: int) -> list[int]:
-        """Return the numbers of all contacts of the same moving tool: contacts with the same `direction` and name.
-
-        Args:
-            number: number in `items` of a contact, or of another item.
-
-        Returns:
-            Numbers of these contacts in `items`, ascending; the number itself for an item without `direction`.
-        """
+        """Return the numbers in `items` of all contacts of the same moving tool, with the same `direction` and name.
+        They are ascending; for an item without `direction` it is its own number."""
         item = self.items[number]
         if item.direction is None:
             return [number]
@@ -244,17 +238,9 @@ class Scene:
         return drivable[0] if len(drivable) == 1 else None
 
     def only_driven(self, caller: str) -> Any:
-        """Return the item that a run with one control controls.
+        """Return the item that a run with one control controls; raise `InputError` for none or several.
 
-        Args:
-            caller: name of the calling function, for messages.
-
-        Returns:
-            The item.
-
-        Raises:
-            InputError: no item or several items can be controlled, or another support constrains the component of the
-                controlled support.
+        Another support must not constrain the component of a controlled support. caller: name for messages.
         """
         if not self.drivable:
             raise InputError(f"{caller}: nothing is driven: give one load no value, as Pressure('bottom'), or"
@@ -262,22 +248,12 @@ class Scene:
         if len(self.drivable) > 1:
             raise InputError(f"{caller}: {', '.join(map(repr, self.drivable))} are all driven: one control drives a"
                              f" run; give the others a value, or drive them in stages with formingx.Process")
-        self.check_driven(self.supports)
+        support_checks.check_driven(self.supports)
         return self.driven
 
     def number(self, caller: str, item: Any) -> int:
-        """Return the number of an item in `items`.
-
-        Args:
-            caller: name of the calling function, for the message.
-            item: the load, support or contact, or its name.
-
-        Returns:
-            The number.
-
-        Raises:
-            InputError: the item is not in the scene.
-        """
+        """Return the number in `items` of a load, support or contact, or of its name; raise `InputError` without it.
+        caller: name of the calling function, for the message."""
         for i, own in enumerate(self.items):
             if item is own or isinstance(item, str) and item == own.name:
                 return i
@@ -286,41 +262,10 @@ class Scene:
                          + (f"; by name {', '.join(map(repr, names))}" if names else ""))
 
     def column(self, item: Any) -> str:
-        """Return the name of the column of a `Path` that contains the pressure or the travel of an item.
-
-        Args:
-            item: an item that can be controlled.
-
-        Returns:
-            "pressure" or "travel", preceded by the name of the item if several items can be controlled.
-        """
+        """Return the name of the column of a `Path` with the pressure or the travel of an item that can be controlled.
+        It is preceded by the name of the item if several items can be controlled."""
         alone = len(self.drivable) == 1 or not item.name
         return item.quantity if alone else f"{item.name}_{item.quantity}"
-
-    def check_constrained(self, supports: Sequence[Any], touched: bool = False) -> None:
-        """Check that the active supports constrain u_r on the axis and prevent rigid motions of the body.
-
-        Args:
-            supports: the active supports.
-            touched: True if a tool may prevent rigid motions; then only the axis is checked.
-
-        Raises:
-            InputError: the axis is unconstrained, or the body can move as a rigid body.
-        """
-        support_checks.check_axis(self, supports)
-        if not touched:
-            support_checks.check_rigid_body(self, supports)
-
-    def check_driven(self, supports: Sequence[Any]) -> None:
-        """Check that no support drives a displacement component that another support constrains or drives.
-
-        Args:
-            supports: the active supports.
-
-        Raises:
-            InputError: two supports act on the same component of the same boundary.
-        """
-        support_checks.check_driven(supports)
 
     def _has_constants_of_mesh(self) -> bool:
         """Return True if a material constant is a UFL expression of the given mesh, so that the mesh must be kept."""
@@ -387,15 +332,7 @@ class Scene:
         return dict(laws)
 
     def sample(self, layer: str) -> Sample:
-        """Return the quadrature points of the energy in a layer, with their positions on the first mesh of the run.
-
-        Args:
-            layer: name of the layer.
-
-        Returns:
-            Positions of q points in each of m cells, shape (m q, 2), length. Local numbers of the cells, shape (m,),
-            positions in the reference cell, shape (q, 2), and temperatures, shape (m q,) or None.
-        """
+        """Return the quadrature points of the energy in a layer, with their positions on the first mesh of the run."""
         check_name("Scene.sample: layer", layer, self.mesh.layers)
         found = sample(self.mesh, layer, self.quadrature_degree, self.temperature)
         if self.state_transfer is None:
@@ -403,28 +340,9 @@ class Scene:
         return found._replace(points=self.state_transfer.original_positions(found.points))
 
     def shear_modulus(self, layer: str) -> float:
-        """Return the small-strain shear modulus of a layer.
-
-        Args:
-            layer: name of the layer.
-
-        Returns:
-            Modulus, stress; for constants that vary over the body the largest one of all ranks.
-        """
+        """Return the small-strain shear modulus of a layer, stress; the largest one if constants vary over the body."""
         check_name("Scene: layer", layer, self._moduli)
         return self._moduli[layer]
-
-    def check_travel(self, contact: Contact, travel: float) -> None:
-        """Check that a tool does not pass through a constrained boundary.
-
-        Args:
-            contact: the `Contact` of the tool.
-            travel: travel of the tool, length.
-
-        Raises:
-            InputError: all nodes of a constrained boundary would lie inside the tool.
-        """
-        contact_checks.check_travel(self, contact, travel)
 
     @property
     def extent(self) -> np.ndarray:

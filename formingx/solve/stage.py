@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError, as_list, check_name, check_type, finite, positive
 from ..measures.targets import Target
-from ..scene import target_checks
+from ..scene import support_checks, target_checks
 from ..scene.scene import Scene
 from .equations import Array
 from .stepping import StepControl
@@ -243,8 +243,8 @@ def plan(scene: Scene, stage: Stage) -> Plan:
     active = [item for i, item in enumerate(scene.items) if i not in inactive]
     try:
         supports = [item for item in active if item in scene.supports]
-        scene.check_constrained(supports, any(contact in active for contact in scene.contacts))
-        scene.check_driven(supports)
+        support_checks.check_held(scene, supports, any(contact in active for contact in scene.contacts))
+        support_checks.check_driven(supports)
         targets = [t for t in (stage.until, stage.constant, *stage.intermediate) if t is not None]
         target_checks.check(scene, targets, inactive)
     except InputError as error:
