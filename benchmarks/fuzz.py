@@ -352,7 +352,7 @@ def _of_answers() -> dict[str, Callable]:
 # what laws give the package: of UFL expressions, of a problem
 _LAWS = {"strain_energy", "step_energy", "stored_energy", "equilibrium_energy", "elastic_stretches", "damage_energy",
          "dissipation", "updated", "step_error", "check_constants", "constants_at", "guesses", "bind", "shear_limit",
-         "check_driven", "check_constrained", "column", "in_cells", "together"}
+         "column", "in_cells", "together"}
 
 
 def _of_methods(made: Any) -> dict[str, Callable]:
