@@ -273,10 +273,8 @@ class Curve:
     def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
              bend: Bend | None = None, equation: Constraint | None = None) -> State:
         """Return the state at an arc length from `old` (Song 1993, eqs. 4.14 to 4.31); raise `Failure` without one.
-
-        Newton's method corrects a guess on the tangent in the plane normal to it, or where `equation` holds, such as
-        "quantity = target". `earlier` bends the guess to a parabola, and `bend` adds (dx, shape (n,); dcontrol).
-        """
+        It lies in the plane normal to the tangent, or where `equation` holds, such as "quantity = target". `earlier`
+        bends the guess to a parabola, and `bend` adds (dx, shape (n,); dcontrol)."""
         end = equation or self._plane(old, *self._predicted(old, length))
         return self._solve_from(*self._predicted(old, length, earlier, bend), end, old, predictor)
 
