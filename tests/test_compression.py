@@ -97,7 +97,7 @@ def test_forces_in_roll_over_under_little_friction_need_short_steps(friction):
     """A point may stick in one part of a step and slide in the other: the error is of first order in the length."""
     fine = roll_over(friction, fx.StepControl(length=0.01, largest=0.01), penalty=2e6, elastic_slip=1e-4)
     assert roll_over(friction) == pytest.approx(fine, rel=6e-3)
-    assert roll_over(friction, fx.StepControl(length=0.05, largest=0.05)) == pytest.approx(fine, rel=3e-3)
+    assert roll_over(friction, fx.StepControl(length=0.025, largest=0.025)) == pytest.approx(fine, rel=1e-3)
 
 
 @pytest.mark.parametrize("change, message", [
