@@ -118,10 +118,11 @@ def draw_history(path, axes):
 
 def main():
     args = parser("stretch_blow", __doc__).parse_args()
-    elements, solid_elements = ((20, 5), (30, 1)) if args.quick else ((64, 16), (120, 2))
+    elements, ring_elements, solid_elements = ((20, 5), (20, 5), (30, 1)) if args.quick else (
+        (64, 16), (128, 8), (240, 2))
     square = square_mould()
     path, plain = bottle(square, elements), bottle(square, elements, with_rod=False)
-    ring = bottle(fx.tools.revolved(round_profile()), elements, fill=ROUND_FILL)
+    ring = bottle(fx.tools.revolved(round_profile()), ring_elements, fill=ROUND_FILL)
     wall, part = path.wall(), path.part(density=DENSITY, units=UNITS)
     summary = {"least_wall_mm": part.min_wall, "weight_g": part.weight,
                "rod_force_largest_N": float(np.abs(path["rod_force"]).max()),

@@ -281,6 +281,16 @@ def test_a_sharp_ridge_is_named_before_a_sheet_slides():
     assert not [f for f in fx.check(scenes["stick"]).findings if "ridge" in f.text]
 
 
+def test_small_fillets_where_parts_meet_are_named_before_a_sheet_slides():
+    """The fillet of 4 between body and neck is below the triangles, which matters to a sheet that slides."""
+    mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(34, 9), part="quarter", end="closed")
+    tool = fx.tools.intersection(ROUNDED, NECK, fillet=4.0)
+    found = {friction: [f.text for f in fx.check(blown(mesh, [fx.Clamped("neck")], tool, friction=friction)[
+        0]).findings if "fillets of radius" in f.text] for friction in (0.3, "stick")}
+    assert len(found[0.3]) == 1 and "fillets of radius 4," in found[0.3][0] and not found["stick"]
+    assert "may not converge" in found[0.3][0]
+
+
 @pytest.mark.thorough
 def test_melt_slides_into_a_square_bottle_whose_ridges_have_fillets():
     """The bottle of the demos with all edges round: with a sharp ridge the run ends at three fifths of the volume."""
@@ -409,6 +419,25 @@ def test_tube_sags_then_halves_close_then_air_blows():
     assert path.state(stage="hang").measures["sag"] == pytest.approx(1.66, abs=0.05)
     assert path["process_time"][-1] == pytest.approx(4.0) and path.filling("mould").touching[-1] > 0.95
     assert path["enclosed_volume"][-1] == pytest.approx(5.44e5, rel=0.02)
+
+
+@pytest.mark.thorough
+def test_tube_sags_with_support_air_then_halves_close_then_air_blows():
+    """The same with a little air from the first half second on, which the hanging tube keeps while the halves close."""
+    mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(12, 3), part="quarter")
+    chain = fx.Scene(
+        mesh=mesh, thickness=2.5, materials=RELAXING, supports=[fx.Clamped("neck"), *SYMMETRIES["quarter"]],
+        loads=[fx.Pressure("inner", name="air", above=-180.0), fx.Gravity(density=0.76e-9, value=9810.0)],
+        contacts=[fx.Contact("outer", fx.tools.half(BOTTLE).moved(x=40.0), "stick", direction=(-1, 0, 0),
+                             name="mould")])
+    path = fx.Process(chain).run([
+        fx.Stage("hang", amplitudes={"air": [(0, 0), (0.5, 5e-4), (2.0, 5e-4)]}),
+        fx.Stage("close", control="mould", until=fx.travel(40.0), duration=1.0),
+        fx.Stage("blow", control="air", until=fx.pressure(0.6), duration=1.0)], progress=False)
+    closed = path.state(stage="close").measures
+    assert closed["air_pressure"] == pytest.approx(5e-4) and closed["mould_travel"] == 40.0
+    assert path["process_time"][-1] == pytest.approx(4.0) and path.filling("mould").touching[-1] > 0.93
+    assert path["enclosed_volume"][-1] == pytest.approx(5.44e5, rel=0.03)
 
 
 @pytest.mark.slow

@@ -65,6 +65,9 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
     for contact in scene.contacts:
         radius, place = min((_smallest_fillet(part, nodes, length) for part in _parts(contact.tool)),
                             key=lambda found: found[0])
+        edge = _smallest_edge(contact.tool, convex=not contact.sticks)
+        if edge < radius:
+            radius, place = edge, None
         if radius < length:
             position = "" if place is None else f", as at (x, y, z) = ({', '.join(f'{v:.4g}' for v in place)})"
             slides = "" if contact.sticks else ", and a sheet that slides may not converge"
@@ -72,6 +75,17 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
                           f" edges of the triangles are longer than {length:.4g}: the wall there will be too thick or"
                           f" too thin by tens of per cent{slides}. Use triangles of size {radius:.3g} or less, or"
                           f" adapt_mesh=True.")
+
+
+def _smallest_edge(tool: Any, convex: bool) -> float:
+    """Return the smallest fillet of the edges where parts of a tool meet, length; inf without one.
+
+    convex: True to count the edges of intersections, which are convex, with the concave ones of unions.
+    """
+    union = isinstance(tool, Union)
+    parts = tool.parts if union else [tool.first, tool.second] if isinstance(tool, Intersection) else []
+    own = [tool.fillet] if parts and tool.fillet > 0 and (union or convex) else []
+    return float(min([*own, *(_smallest_edge(part, convex) for part in parts)], default=np.inf))
 
 
 def _smallest_fillet(tool: Any, nodes: np.ndarray | None, length: float) -> tuple[float, np.ndarray | None]:
