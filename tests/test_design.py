@@ -48,15 +48,20 @@ def test_derivatives_are_those_of_whole_runs():
 def test_differences_of_whole_runs_are_the_derivatives():
     """Also of a measure of earlier states, at a bound, and in an executor; a run that fails is named."""
     ranges = {"c": (0.0, -1, 1), "h": (0.05, 0.01, 0.05), "height": (0.6, 0.1, 1.0)}
-    exact = fx.Design(disc, ranges).run()
+    exact, seen = fx.Design(disc, ranges).run(), []
+
+    def build(c, h, height):
+        seen.append(h)
+        return disc(c, h, height)
     with ThreadPoolExecutor(1) as one:
-        design = fx.Design(disc, ranges, derivatives="runs", executor=one)
+        design = fx.Design(build, ranges, derivatives="runs", executor=one)
         run = design.run()
         for measure in ("wall", "pressure", "volume"):
             assert run.derivative(measure)[1] == pytest.approx(exact.derivative(measure)[1], rel=0.05, abs=2e-4)
         assert design.whole_runs.count == 3
         assert run.derivative(highest_pressure)[1].shape == (1, 3) and design.whole_runs.count == 6
         assert design.whole_runs.since(0)[1] == "6 for differences of whole runs, by the executor"
+        assert max(seen) == 0.05 and min(seen) == pytest.approx(0.05 - 0.02 * 0.04)         # not beyond the bound
         answer = design.fit(even=True, start=run, max_runs=9)
     assert answer.cv[1] < answer.cv[0] and answer.paths <= 9 and answer.difference_runs > 0
     with pytest.raises(fx.InputError, match=r"no derivative by height: the run at 0.78, next to 0.6, fails: .*a=10"):
