@@ -20,6 +20,8 @@ _UNBALANCED = 0.02         # share of the resultant of the loads that supports a
 
 _LEAST_RESULTANT = 1e-3    # of loads, over the sum of the forces at all nodes, to which missed forces are compared
 
+_SLACK = 1e-4              # pressure over its target below which a sheet carries no load yet
+
 _LARGE_WALL_ERROR = 0.2
 """Estimated error of the minimum wall over this wall above which a run warns of it."""
 
@@ -155,3 +157,21 @@ def asymmetric_across_planes(body: Any) -> Iterator[Finding]:
                 yield Finding("warning", repr(contact), f"the tool is not symmetric about the plane {'xy'[axis]} ="
                               f" {plane:.4g} of {support!r}: the run forms the part of a tool that is mirrored there."
                               f" Move the tool, or model the whole sheet.")
+
+
+@register("failure")
+def slack_sheet(failure: Any) -> Iterator[Finding]:
+    """Yield a finding if a sheet that has relaxed on a tool is slack at the start of a pressure in no time; collective.
+
+    Only a very small stiffness then holds its positions, of which many are in equilibrium.
+    """
+    problem, facts, target = failure.problem, failure.facts, failure.target
+    if failure.last is None or problem.scene.kinematics.components != 3 or not target:
+        return
+    relaxes = any(material.internal or material.integral for material in problem.scene.materials.values())
+    at_start = problem.description.control_kind == "pressure" and abs(facts["control"]) < _SLACK * abs(target)
+    if relaxes and at_start and not problem.setting.rate[-1] and failure.last.time:
+        yield Finding("serious", "membrane", f"the sheet is slack: it has relaxed and carries no load yet, at"
+                      f" {facts['what']} = {facts['control']:.3g}, and no time passes in this stage, so nothing holds"
+                      f" its folds", "a duration for this stage, Stage(..., duration=...), in which the sheet resists"
+                                     " by its viscosity")
