@@ -118,7 +118,7 @@ def draw_history(path, axes):
 
 def main():
     args = parser("stretch_blow", __doc__).parse_args()
-    elements, ring_elements, solid_elements = ((20, 5), (20, 5), (30, 1)) if args.quick else (
+    elements, ring_elements, solid_elements = ((18, 4), (18, 4), (24, 1)) if args.quick else (
         (64, 16), (128, 8), (240, 2))
     square = square_mould()
     path, plain = bottle(square, elements), bottle(square, elements, with_rod=False)
