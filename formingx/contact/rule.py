@@ -206,11 +206,6 @@ class Vertices(_NodalPoints):
         self.lengths = np.sqrt(self.area)
         self.surface, self._assemble = surface, assemble
 
-    @cached_property
-    def _deformed_area(self) -> Any:
-        """Compiled linear form whose entries are the deformed tributary areas of the nodes."""
-        return self.surface.compile(self.surface.area_row(deformed=True))
-
     def area_ratio(self, fields: np.ndarray) -> np.ndarray:
         """Return the deformed area of the triangles around each node over their reference area, shape (n,); collective.
         """
@@ -218,7 +213,7 @@ class Vertices(_NodalPoints):
         before = w.array.copy()
         w.array[: len(fields)] = fields
         w.scatter_forward()
-        area = self._assemble(self._deformed_area)[self.dofs[:, 0]]
+        area = self._assemble(self.surface.deformed_area)[self.dofs[:, 0]]
         w.array[:] = before
         return area / self.area
 

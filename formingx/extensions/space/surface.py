@@ -138,6 +138,11 @@ class Surface(Formulation):
         ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
         return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
 
+    @cached_property
+    def deformed_area(self) -> Any:
+        """Compiled linear form of the deformed tributary areas of nodes (`area_row`)."""
+        return self.compile(self.area_row(deformed=True))
+
     @property
     def heat_history(self) -> Any:
         """Class of the history of temperatures of a sheet with heat conduction (`Cooling`)."""

@@ -55,17 +55,12 @@ class SheetNodes:
 
     def area_ratio(self) -> np.ndarray:
         """Return the deformed over the reference area of the owned nodes, shape (n,), for the present fields."""
-        return self._assembled(self._deformed) / self.area
+        return self._assembled(self._surface.deformed_area) / self.area
 
     @cached_property
     def thickness(self) -> np.ndarray:
         """Reference thickness at the owned nodes, shape (n,), length."""
         return np.asarray(sum(given(*self.points.T) for given in self._surface.scene.thickness.values()))
-
-    @cached_property
-    def _deformed(self) -> Any:
-        """Compiled linear form of the deformed areas of the nodes."""
-        return self._surface.compile(self._surface.area_row(deformed=True))
 
     def _areas(self, form: Any) -> np.ndarray:
         """Return the entries of a linear form (UFL) at the first component of the owned nodes, shape (n,)."""
