@@ -29,7 +29,7 @@ from .tools.tool import PlaneTool, RigidTool
 _CLEAR_ERRORS = (InputError, ConvergenceError, OSError)      # errors whose messages name the cause
 _WORDS = {float: "a number", int: "a whole number", str: "a word", bool: "True or False", type(None): "None"}
 _PACKAGE = __name__.partition(".")[0]
-_INTERNAL = {"physics", "contact", "forms", "problem", "measures", "solve"}
+_INTERNAL = {"physics", "contact", "contact_events", "forms", "problem", "measures", "solve"}
 """Folders of classes whose methods the solver calls: only their constructors are explained."""
 _TOOL_METHODS = {name for protocol in (RigidTool, PlaneTool) for name in vars(protocol) if not name.startswith("_")}
 """Methods of tools that the solver calls in every iteration."""
@@ -69,7 +69,7 @@ def _explain_class(cls: type) -> None:
 
 def _is_internal(cls: type) -> bool:
     """Return True if the solver calls the methods of a class during a run."""
-    return not _INTERNAL.isdisjoint(cls.__module__.split(".")[1:2])
+    return not _INTERNAL.isdisjoint(cls.__module__.replace(".extensions.", ".").split(".")[1:2])
 
 
 def _explain_methods(cls: type) -> None:
