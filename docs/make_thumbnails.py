@@ -14,7 +14,7 @@ from PIL import Image
 
 DOCS = Path(__file__).parent
 PICTURES, THUMBNAILS = DOCS.parent / "demos" / "pictures", DOCS / "thumbnails"
-WIDTH, COLOURS, MARGIN = 480, 96, 6                            # pixels, colours, pixels
+WIDTH, COLOURS, MARGIN = 480, 128, 6                           # pixels, colours, pixels
 PANELS = {
     "balloon": (0, 0, 1 / 3, 1), "bottle_3_to_1": (0, 0, 0.31, 1), "chilling": (0.5, 0, 1, 0.5),
     "clamp_ring": (0.64, 0, 1, 1), "closing_halves": (0.5, 0, 1, 1),
