@@ -62,6 +62,8 @@ class ActiveSetChanges:
 
     Attributes:
         changed: number of the iteration in which the active set changed last, counted from 0.
+        share: factor of the next correction, halved (to 1/4 at least) when an earlier active set returns, as full
+            corrections would cycle.
         found: number of small corrections that led to a new active set, for `Newton.exempt_iterations`.
         returns: number of returns to an earlier active set.
     """
@@ -70,7 +72,7 @@ class ActiveSetChanges:
         self._problem, self._small, self._iteration = problem, small, -1
         self._seen: set[Hashable] = set()
         self._last: Hashable = None
-        self.changed, self.found, self.returns = 0, 0, 0
+        self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def compare(self, moved: float) -> None:
         """Compare the active set with earlier ones, once after each residual.
@@ -82,9 +84,12 @@ class ActiveSetChanges:
         if now != self._last and self._last is not None:
             self.changed = self._iteration
             if now in self._seen:
+                self.share = max(self.share / 2, 0.25)
                 self.returns += 1
             else:
                 self.found += moved < self._small and not self._problem.history.path_dependent
+        elif self._iteration > self.changed + 1:
+            self.share = 1.0
         self._seen.add(now)
         self._last = now
 
@@ -366,16 +371,17 @@ class BorderedNewton:
             if not self._solve(x, control, chord, rescale=not history):
                 raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)
+            share = active.share
             if points and active.changed == len(history) != self.settings.uncorrected_iteration:
                 border = BorderedTangent(self.gradient, self.b, self._slope)
-                step = points.correct(self.solver, self.a, step, border)
+                step, share = points.correct(self.solver, self.a, step, border), 1.0
                 if points.failed == 2 and problem.history.path_dependent:
                     raise Failure("contact does not settle: no combination of touching, sticking and sliding is"
                                   " in equilibrium at the points that change", history)
             work = abs(self.F.dot(self.a))
             work0 = work0 or work or 1.0
-            x.axpy(1.0, self.a)
-            control += step
+            x.axpy(share, self.a)
+            control += share * step
             moved = self._norm(self.a, step)
             correction = moved / (self._norm(x, control) + self.settings.displacement_floor)
             if not np.isfinite(correction):

@@ -212,8 +212,8 @@ class KBKZ(RelaxingMaterial):
         100.0
         """
         rate, t = positive(f"{self}: shear: rate", rate), finite_array(f"{self}: shear: times", times)
-        if np.any(t < 0):
-            raise InputError(f"{self}: shear: times = {times!r}: must not be negative")
+        if t.ndim > 1 or np.any(t < 0):
+            raise InputError(f"{self}: shear: times = {times!r}: must not be negative, of shape (n,)")
         modulus, tau = np.array(self.spectrum).T
         first = 1e-3 * tau.min()                             # largest age in the first interval of the integral
 
