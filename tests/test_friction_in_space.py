@@ -129,7 +129,7 @@ def test_capstan(mu):
     on &= (angle > 0.15) & (angle < angle[on].max() - 0.08)
     slope = np.polyfit(angle[on], np.log(force[on]), 1, w=np.sqrt(wall.area[on]))[0]
     assert slope == pytest.approx(mu, rel=5e-3)
-    assert path.counts.iterations < 450
+    assert path.counts.iterations < 550
 
 
 def test_a_ball_is_pushed_against_a_pressure():
@@ -145,7 +145,7 @@ def test_force_of_a_rough_ball(rough_ball):
     forces = []
     for path in (rough_ball, fx.trace(pushed(0.3, nodes_per_step=3), until=fx.travel(0.9), progress=False)):
         forces.append(path.last.measures["tool_force"])
-        assert path.counts.iterations < 450 and path.last.measures["penetration"] < 1e-4 * THICKNESS
+        assert path.counts.iterations < 700 and path.last.measures["penetration"] < 1e-4 * THICKNESS
     assert forces[0] == pytest.approx(exact, rel=0.015) and forces[1] == pytest.approx(forces[0], rel=0.01)
 
 
@@ -241,6 +241,23 @@ def test_walls_of_a_rough_cup():
 
 
 @pytest.mark.thorough
+def test_no_point_jumps_over_a_lip_in_a_default_step():
+    """A lip is half as wide as a triangle: walls agree with those of short steps to 3 %, triangle by triangle.
+
+    With steps in which the pressure changes by a fifth, a point slid over it, and triangles were wrong by 90 %.
+    """
+    mould = fx.tools.box(half=(72, 42), depth=30, corner=18, fillet=8, lip=3, draft=8)
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(160.0, 100.0, corner=20.0, part="quarter"), size=6.0)
+    scene = fx.Scene(mesh=sheet, thickness=1.5, materials=fx.NeoHookean(c10=0.05), supports=HELD,
+                     model=fx.Membrane(wrinkles=0.01), loads=[fx.Pressure("top")],
+                     contacts=[fx.Contact("bottom", mould, 0.3, name="mould")])
+    path, short = (fx.trace(scene, until=fx.pressure(0.09), step=step, progress=False)
+                   for step in (None, fx.StepControl(largest=0.05)))
+    assert np.abs(path.wall().ratio / short.wall().ratio - 1).max() < 0.03
+    assert path.counts.failures < 0.2 * path.counts.steps
+
+
+@pytest.mark.thorough
 def test_plug_tray_quick(tmp_path):
     """Results are of the whole tray: its weight equals the sheet's, and half and quarter models agree to 0.5 %."""
     found = summary("plug_tray", tmp_path, "--quick")
@@ -253,19 +270,22 @@ def test_plug_tray_quick(tmp_path):
 
 @pytest.mark.parametrize("friction", ["none", 0.3])
 def test_thin_sheets_deform_and_let_go_alike(friction):
-    """Steps, walls and forces over the thickness are those of a sheet of 0.01 times its extent, also as a ball lifts.
+    """At equal travel, walls and forces over the thickness are those of a thicker sheet, also as a ball lifts.
 
     Where the sheet should let go of the ball, it pulls at it by no more than 1e-5 of the largest force.
     """
-    found = []
+    found, travels = [], [fx.travel(v) for v in (0.1, 0.2, 0.3, 0.4, 0.3, 0.2, 0.1)]
     for thickness in (1e-2, 4e-4, 3e-6):
         sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=0.2)
         scene = fx.Scene(mesh=sheet, thickness=thickness, materials=MATERIAL, supports=HELD, contacts=[
             fx.Contact("top", fx.tools.revolved(BALL), friction, direction=(0, 0, -1), name="ball")])
-        path = fx.Process(scene).run([fx.Stage("push", control="ball", until=fx.travel(0.4)), fx.Stage(
-            "lift", control="ball", until=fx.travel(-0.02))], progress=False)
+        path = fx.Process(scene).run([
+            fx.Stage("push", control="ball", until=fx.travel(0.4), intermediate=travels[:3]),
+            fx.Stage("lift", control="ball", until=fx.travel(-0.02), intermediate=travels[4:])], progress=False)
         assert path["tool_force"].min() > -1e-5 * path["tool_force"].max()
-        found.append((path["tool_force"] / thickness, path.wall(path.states[8]).ratio))
+        met = np.flatnonzero(np.isclose(path["travel"][:, None], [0.1, 0.2, 0.3, 0.4], rtol=1e-12).any(1))
+        assert len(met) >= len(travels)
+        found.append((path["tool_force"][met] / thickness, [path.wall(path.states[k]).ratio for k in met]))
     for force, wall in found[1:]:
-        np.testing.assert_allclose(force, found[0][0], atol=1e-5)
+        np.testing.assert_allclose(force, found[0][0], rtol=0, atol=1e-5)
         np.testing.assert_allclose(wall, found[0][1], rtol=1e-6)

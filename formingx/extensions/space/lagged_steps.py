@@ -47,7 +47,7 @@ class LaggedLimits:
     """
 
     max_approach_ratio: float = 0.7
-    max_pressure_change: float = 0.2
+    max_pressure_change: float = 0.05
     max_pressure_difference: float = 5e-3
     max_corrections: int = 3
     max_target_difference: float = 1e-4
