@@ -11,7 +11,9 @@ import pytest
 from conftest import treloar
 
 import formingx as fx
+from formingx import _calls
 from formingx.extensions.adapt.column_factors import column_factors
+from formingx.extensions.contact_events.reduced_contact import CondensedPoints
 
 
 @pytest.fixture(scope="module")
@@ -75,6 +77,7 @@ def test_calls_inside_a_run_are_not_explained():
     for (_, _, name), row in pstats.Stats(profile).stats.items():
         calls[name] += row[1]
     assert path["contact_length"][-1] > 0 and calls["nearest"] > 50 and calls["explained"] < calls["nearest"] / 2
+    assert _calls._is_internal(type(path.problem.contacts[0].law)) and _calls._is_internal(CondensedPoints)
     assert not any(hasattr(method, "_is_explained") for base in type(path.problem.contacts[0].law).__mro__
                for method in vars(base).values())
 

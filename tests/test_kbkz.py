@@ -113,3 +113,6 @@ def test_shear_starts_without_stress():
     assert melt.shear(rate, t) == pytest.approx(expected, rel=1e-12, abs=0)
     with pytest.raises(fx.InputError, match=r"shear: times = \[0.0, -1.0\]: must not be negative"):
         melt.shear(rate, [0.0, -1.0])
+    for times in ([[0.0, 1.0]], [[]]):
+        with pytest.raises(fx.InputError, match=r"shear: times = .*: must not be negative, of shape \(n,\)"):
+            melt.shear(rate, times)

@@ -404,18 +404,23 @@ def test_relaxed_energy_leaves_simple_tension_of_a_relaxing_tube_as_it_is():
     assert sags[1] == pytest.approx(sags[0], rel=1e-3) and sags[0] > 1.1
 
 
-@pytest.mark.slow
-def test_tube_sags_then_halves_close_then_air_blows():
-    """One process of a relaxing tube: it hangs for two seconds, is pinched, and fills the mould."""
+def hung_closed_and_blown(**hang):
+    """A relaxing tube that hangs, with the arguments of that stage, is pinched by the halves and blown into them."""
     mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(21, 4), part="quarter")
     chain = fx.Scene(
         mesh=mesh, thickness=2.5, materials=RELAXING, supports=[fx.Clamped("neck"), *SYMMETRIES["quarter"]],
         loads=[fx.Pressure("inner", name="air", above=-180.0), fx.Gravity(density=0.76e-9, value=9810.0)],
         contacts=[fx.Contact("outer", fx.tools.half(BOTTLE).moved(x=40.0), "stick", direction=(-1, 0, 0),
                              name="mould")])
-    path = fx.Process(chain).run([
-        fx.Stage("hang", duration=2.0), fx.Stage("close", control="mould", until=fx.travel(40.0), duration=1.0),
+    return fx.Process(chain).run([
+        fx.Stage("hang", **hang), fx.Stage("close", control="mould", until=fx.travel(40.0), duration=1.0),
         fx.Stage("blow", control="air", until=fx.pressure(0.6), duration=1.0)], progress=False)
+
+
+@pytest.mark.slow
+def test_tube_sags_then_halves_close_then_air_blows():
+    """One process of a relaxing tube: it hangs for two seconds, is pinched, and fills the mould."""
+    path = hung_closed_and_blown(duration=2.0)
     assert path.state(stage="hang").measures["sag"] == pytest.approx(1.66, abs=0.05)
     assert path["process_time"][-1] == pytest.approx(4.0) and path.filling("mould").touching[-1] > 0.95
     assert path["enclosed_volume"][-1] == pytest.approx(5.44e5, rel=0.02)
@@ -424,16 +429,7 @@ def test_tube_sags_then_halves_close_then_air_blows():
 @pytest.mark.thorough
 def test_tube_sags_with_support_air_then_halves_close_then_air_blows():
     """The same with a little air from the first half second on, which the hanging tube keeps while the halves close."""
-    mesh = fx.mesh.tube(radius=16.0, length=210.0, elements=(21, 4), part="quarter")
-    chain = fx.Scene(
-        mesh=mesh, thickness=2.5, materials=RELAXING, supports=[fx.Clamped("neck"), *SYMMETRIES["quarter"]],
-        loads=[fx.Pressure("inner", name="air", above=-180.0), fx.Gravity(density=0.76e-9, value=9810.0)],
-        contacts=[fx.Contact("outer", fx.tools.half(BOTTLE).moved(x=40.0), "stick", direction=(-1, 0, 0),
-                             name="mould")])
-    path = fx.Process(chain).run([
-        fx.Stage("hang", amplitudes={"air": [(0, 0), (0.5, 5e-4), (2.0, 5e-4)]}),
-        fx.Stage("close", control="mould", until=fx.travel(40.0), duration=1.0),
-        fx.Stage("blow", control="air", until=fx.pressure(0.6), duration=1.0)], progress=False)
+    path = hung_closed_and_blown(amplitudes={"air": [(0, 0), (0.5, 5e-4), (2.0, 5e-4)]})
     closed = path.state(stage="close").measures
     assert closed["air_pressure"] == pytest.approx(5e-4) and closed["mould_travel"] == 40.0
     assert path["process_time"][-1] == pytest.approx(4.0) and path.filling("mould").touching[-1] > 0.93

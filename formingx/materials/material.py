@@ -423,14 +423,11 @@ class Material(Energies):
         l, n = np.array([1.02, 0.99, 1 / 1.02 / 0.99])[:, None], sets.shape[1]
         if not n:
             return True
-
-        def stresses(response: Response, x: np.ndarray) -> np.ndarray:         # less their mean, which p takes up
-            given = x * response.derivatives(np.tile(x, (1, n)), sets)[0]
-            return np.asarray(given - given.mean(0))
-
-        g, turned, last = stresses(self.response, l), stresses(self._turned_response, l), np.roll(l, 1, axis=0)
-        error = np.maximum(np.abs(np.roll(g, 1, axis=0) - stresses(self.response, last)), np.abs(g - turned)).max(0)
-        return bool(np.all(error <= 1e-8 * np.abs(self.response.derivatives(np.tile(l, (1, n)), sets)[0]).max(0)))
+        g, permuted, turned = (x * response.derivatives(np.tile(x, (1, n)), sets)[0] for response, x in (
+            (self.response, l), (self.response, np.roll(l, 1, axis=0)), (self._turned_response, l)))
+        s, permuted, turned = (stress - stress.mean(0) for stress in (g, permuted, turned))     # p takes up the mean
+        error = np.maximum(np.abs(np.roll(s, 1, axis=0) - permuted), np.abs(s - turned)).max(0)
+        return bool(np.all(error <= 1e-8 * np.abs(g / l).max(0)))
 
     @functools.cached_property
     def _turned_response(self) -> Response:

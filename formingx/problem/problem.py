@@ -569,6 +569,7 @@ class SceneDescription:
         scales: value in the user's units over dimensionless amplitude of each item; at the end 1.0 for process time.
         units: units of the dimensionless energy of the whole part (stress length^3) and of length, in the user's units.
         fixed_loads: loads that act already at control 0, as text.
+        main_columns: names of the output quantities that `Record.describe` states.
     """
 
     def __init__(self, problem: Problem):
@@ -577,9 +578,8 @@ class SceneDescription:
         self.scales: Sequence[float] = forms.scales
         self.units: tuple[float, float] = (scene.symmetry_factor * forms.stress * forms.volume, forms.length)
         self.fixed_loads: Sequence[str] = [repr(load) for load in scene.loads if not load.driven]
-
-    main_columns: Sequence[str] = cached_property(lambda self: [  # type: ignore[assignment]
-        "process_time", *map(self._scene.column, self._scene.drivable), "pole_height", "pole_stretch"])
+        self.main_columns: Sequence[str] = [
+            "process_time", *map(scene.column, scene.drivable), "pole_height", "pole_stretch"]
 
     @cached_property
     def _names(self) -> list[str]:

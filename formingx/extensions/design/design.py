@@ -187,12 +187,8 @@ class Design:
         best, runs, predicted, gained_before = first, [first], first.wall, 1.0
         failed: list[str] = []
         before = self.whole_runs.count
-
-        def left() -> int:
-            """Return the number of runs that the search may still take."""
-            return max_runs - len(runs) - len(failed) - (self.whole_runs.count - before)
         reason = f"max_runs = {max_runs} were used up"
-        while left() > best.missing_runs:
+        while self._runs_left(max_runs, runs, failed, before) > best.missing_runs:
             try:
                 residual, jacobian = objective.residual(best)
             except InputError as error:
@@ -213,7 +209,7 @@ class Design:
                     f"the next step, within the bounds, would be {100 * max(improvement, 0.0):.1f} % better")
                 break
             share, new = 1.0, None
-            while share >= SETTINGS.shortest_step and left() > 0:
+            while share >= SETTINGS.shortest_step and self._runs_left(max_runs, runs, failed, before) > 0:
                 try:
                     new = self._run(np.clip(best.vector + share * step, low, high))
                     runs.append(new)
@@ -238,6 +234,10 @@ class Design:
         return DesignResult(first, best, runs, failed, objective.inside, reason, predicted,
                             "\n".join(filter(None, missed)), objective.target_wall, objective.measured,
                             *self.whole_runs.since(before))
+
+    def _runs_left(self, most: int, runs: list[DesignRun], failed: list[str], before: int) -> int:
+        """Return the number of runs that a search may still take; before: count of whole runs at its start."""
+        return most - len(runs) - len(failed) - (self.whole_runs.count - before)
 
     def minimum_weight(self, min_wall: float, within: tuple[float, float] | None = None,
                        max_runs: int | None = None) -> DesignResult:
@@ -276,7 +276,7 @@ class Design:
         def cost(run: DesignRun) -> float:
             """Return the volume of a run over the first run's, plus a penalty for a wall below the minimum."""
             return run.volume / first.volume + 10 * max(min_wall - run.wall[inside].min(), 0.0) / unit
-        while most - len(runs) - len(failed) - (self.whole_runs.count - before) > best.missing_runs:
+        while self._runs_left(most, runs, failed, before) > best.missing_runs:
             try:
                 wall, jacobian = best.derivative("wall")
             except InputError as error:

@@ -67,7 +67,7 @@ class WholeRuns:
             found = [_outputs(*task) for task in tasks]
         else:
             if self._pool is None:
-                self._pool = executor_context(self._executor, self._workers).__enter__()
+                self._pool = self._executor or executor_context(None, self._workers)
             found = list(self._pool.map(_outputs, *zip(*tasks)))
         pairs = []
         for name, value, step, outputs in zip(p.names, vector, steps, found):

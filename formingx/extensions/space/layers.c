@@ -24,8 +24,8 @@ static int apart(const double *a, const double *b)
 static void normal_of(const double *a, const double *b, const double *c, double *n)
 {
     double p[3], q[3];
-    for (int i = 0; i < 3; i++) { p[i] = b[i] - a[i]; q[i] = c[i] - a[i]; }
-    n[0] = p[1] * q[2] - p[2] * q[1]; n[1] = p[2] * q[0] - p[0] * q[2]; n[2] = p[0] * q[1] - p[1] * q[0];
+    away(b, a, p); away(c, a, q);
+    cross(p, q, n);
 }
 
 /* Is x, a point of the plane of a triangle with the normal n, inside it? */

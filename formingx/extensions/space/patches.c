@@ -67,11 +67,6 @@ static void patch(const double *P, double u, double v, double S[6][3])
         }
 }
 
-static void cross(const double *a, const double *b, double *c)
-{
-    c[0] = a[1] * b[2] - a[2] * b[1]; c[1] = a[2] * b[0] - a[0] * b[2]; c[2] = a[0] * b[1] - a[1] * b[0];
-}
-
 /* the derivatives of the flat triangle of a patch */
 static void on_flat(const double *P, double S[6][3])
 {

@@ -21,11 +21,16 @@ _ON_SURFACE = 5e-3         # of a point from the tool, over its size
 _COARSE_WALL = 0.02        # error of the volume of a sheet by its triangles that is reported
 
 
+def _members(tool: Any) -> list[Any]:
+    """Return the tools that a union or an intersection combines, relative to it; an empty list for another tool."""
+    if isinstance(tool, Intersection):
+        return [tool.first, tool.second]
+    return tool.parts if isinstance(tool, Union) else []
+
+
 def _parts(tool: Any) -> list[Any]:
     """Return the parts of unions and intersections of tools, or the tool itself, as a list."""
-    parts = tool.parts if isinstance(tool, Union) else [tool.first, tool.second] if isinstance(
-        tool, Intersection) else []
-    return [piece for part in parts for piece in _parts(part.moved(*tool.shift))] if parts else [tool]
+    return [piece for part in _members(tool) for piece in _parts(part.moved(*tool.shift))] or [tool]
 
 
 def files_of(tool: Any) -> list[Triangulated]:
@@ -82,9 +87,8 @@ def _smallest_edge(tool: Any, convex: bool) -> float:
 
     convex: True to count the edges of intersections, which are convex, with the concave ones of unions.
     """
-    union = isinstance(tool, Union)
-    parts = tool.parts if union else [tool.first, tool.second] if isinstance(tool, Intersection) else []
-    own = [tool.fillet] if parts and tool.fillet > 0 and (union or convex) else []
+    parts = _members(tool)
+    own = [tool.fillet] if parts and tool.fillet > 0 and (convex or isinstance(tool, Union)) else []
     return float(min([*own, *(_smallest_edge(part, convex) for part in parts)], default=np.inf))
 
 

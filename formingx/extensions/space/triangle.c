@@ -3,6 +3,11 @@
 
 static double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
 
+static inline void cross(const double *a, const double *b, double *c)
+{
+    c[0] = a[1] * b[2] - a[2] * b[1]; c[1] = a[2] * b[0] - a[0] * b[2]; c[2] = a[0] * b[1] - a[1] * b[0];
+}
+
 static double away(const double *p, const double *x, double *r)
 {
     for (int i = 0; i < 3; i++) r[i] = p[i] - x[i];
