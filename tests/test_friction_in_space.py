@@ -7,6 +7,7 @@ from test_demos import summary
 from test_space import on_ball, trough
 
 import formingx as fx
+from formingx.extensions.space.lagged_friction import _basis
 from formingx.physics.contact_law import ContactStatus
 
 HELD = [fx.SimplySupported("rim"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")]
@@ -291,3 +292,11 @@ def test_thin_sheets_deform_and_let_go_alike(friction):
     for force, wall in found[1:]:
         np.testing.assert_allclose(force, found[0][0], rtol=0, atol=1e-5)
         np.testing.assert_allclose(wall, found[0][1], rtol=1e-6)
+
+
+def test_axes_of_a_tangent_plane_are_orthonormal():
+    """Also for normals along and against z, and in the plane z = 0."""
+    normals = np.concatenate([np.eye(3), -np.eye(3), np.random.default_rng(1).standard_normal((20, 3))])
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    axes = np.stack([*_basis(normals), normals], axis=1)
+    assert axes @ axes.transpose(0, 2, 1) == pytest.approx(np.tile(np.eye(3), (len(normals), 1, 1)), abs=1e-14)
