@@ -106,6 +106,7 @@ def test_tangent_is_the_derivative_of_the_residual(model):
         assert not problem.symmetric
 
 
+@pytest.mark.thorough
 def test_without_damping_it_is_the_transient_network():
     """Pulled, put further at once, held, let back."""
     stages = [fx.Stage("pull", control="grip", until=fx.travel(0.8), duration=1.0),
