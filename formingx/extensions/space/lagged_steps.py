@@ -32,7 +32,7 @@ class LaggedLimits:
             bounds friction, over the pressure.
         max_corrections: largest number of repeated solutions of a step that reduce this difference.
         max_target_difference: allowed difference between the contact pressure of a state at a target and the pressure
-            with which it was solved, over the pressure.
+            with which it was solved, over the pressure. Walls of frictionless sheets then agree to 1e-6.
         rejection_ratio: multiple of `max_pressure_change`; a solved step with a larger change of the pressure is
             rejected.
         settling_iterations: number of Newton iterations that lagged friction needs in a step, however short the step
@@ -50,7 +50,7 @@ class LaggedLimits:
     max_pressure_change: float = 0.05
     max_pressure_difference: float = 5e-3
     max_corrections: int = 3
-    max_target_difference: float = 1e-4
+    max_target_difference: float = 1e-7
     rejection_ratio: float = 1.4
     settling_iterations: int = 2
     max_solutions: int = 30
