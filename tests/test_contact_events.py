@@ -273,10 +273,10 @@ def test_forces_of_sticking_sliding_and_open_points_together():
     u, to, force = random.uniform(-1, 1, (5, 2)), random.uniform(-1, 1, (5, 2)), near.normal * 2.0
     F, change = points.forces_at_end(u, status, near, force, to)
     dx = u - (points._C @ change.ravel()).reshape(5, 2)
-    N, T = points.parts(F, near)
+    N, T = (np.einsum("ni,ni->n", F, d) for d in (near.normal, near.tangent))
     assert change == pytest.approx(F - force) and F[4] == pytest.approx(0.0, abs=1e-12)
     assert dx[0] == pytest.approx(to[0])                    # it sticks; the next one after its elastic slip
-    slip = 1e-3 * T[1] / (0.3 * points.parts(force, near)[0][1])
+    slip = 1e-3 * T[1] / (0.3 * (force[1] @ near.normal[1]))
     assert dx[1] == pytest.approx(to[1] + slip * near.tangent[1])
     assert [dx[i] @ near.normal[i] for i in (2, 3)] == pytest.approx(near.beyond[2:4])
     assert T[2:4] == pytest.approx([-0.2 * N[2], 0.0])

@@ -187,7 +187,7 @@ def test_work_equals_stored_energy_friction_and_snap_through_losses():
 
 
 @pytest.mark.parametrize("schedule", [
-    {"first_viscosity": 3.0, "min_viscosity_factor": 0.5},
+    {"first_viscosity": 3.0, "viscosity_growth": 2.0},
     pytest.param({"viscosity_growth": 2.0, "viscosity_growth_in_motion": 2.0}, marks=pytest.mark.slow)], ids=str)
 def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, monkeypatch):
     monkeypatch.setattr(Run, "settings", PathFollowing(snap_through=SnapThrough(**schedule)))
@@ -199,7 +199,7 @@ def test_where_jumps_end_does_not_depend_on_how_eta_changes(rough, schedule, mon
 def test_snap_through_states_do_not_depend_on_the_step(monkeypatch):
     """At 7.2, past the third jump; at 6.9, at its brink, which of two states a run ends in is left to round-off."""
     before = pushed(7.2, largest=0.02)["tool_force"][-1]
-    schedule = SnapThrough(first_viscosity=3.0, min_viscosity_factor=0.5)
+    schedule = SnapThrough(first_viscosity=3.0, viscosity_growth=2.0)
     monkeypatch.setattr(Run, "settings", PathFollowing(snap_through=schedule))
     assert pushed(7.2, largest=0.02)["tool_force"][-1] == pytest.approx(before, rel=1e-3)
 

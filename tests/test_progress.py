@@ -71,7 +71,7 @@ def test_a_run_whose_steps_grow_is_not_given_up():
     """Of 501 states that gained less than 1e-3, the last half gained more: a slow ramp that began with short steps."""
     def stalled(values):
         targets = object.__new__(progress.RunTargets)
-        targets.values, targets.until, targets.quantity, targets._best = values, fx.pressure(1.0), None, 0.0
+        targets.values, targets.until, targets.is_control, targets._best = values, fx.pressure(1.0), False, 0.0
         return targets.no_progress()
     assert stalled([1e-4 * k / 500 for k in range(501)]) and stalled([0.0] * 501)
     assert stalled([-1e-7 * k for k in range(501)])

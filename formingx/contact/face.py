@@ -61,7 +61,7 @@ class Increment:
     * `tractions(x)`, for the residual.
     * `linearise(x)` at the same positions. After it, `tractions(x)` returns the linearised law with its stiffness.
     * If statuses change, the local contact problem (`LocalSolve`) reads `status`, `newly_closed` and `last_tractions`,
-      predicts tractions by `law_at` and `predicted`, and sets the sense of sliding of the next iteration by `expect`.
+      predicts tractions by `law_at`, and sets the sense of sliding of the next iteration by `expect`.
 
     Args:
         law: contact law.
@@ -126,15 +126,8 @@ class Increment:
         """Return the tractions, (m, c), stress, and stiffnesses, (m, c, c), that the last `linearise` used."""
         return self._last[1].force[points], self._last[1].stiffness[points]
 
-    def predicted(self, motion: np.ndarray) -> Tractions:
-        """Return the law linearised after a further motion y of all points, shape (n, c), length.
-        Traction f and stiffness S are those before the motion: after it the traction is f + S y."""
-        assert self._before is not None
-        x = self._last[0]
-        return self._law.tractions(x, self._history, None, self._before.to(x + motion))
-
-    def law_at(self, points: np.ndarray) -> Callable[[np.ndarray], Tractions]:
-        """Return `predicted` for m points: a function of their motion y, shape (m, c), length.
+    def law_at(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
+        """Return the law at m points, linearised after a further motion y of them: a function of y, (m, c), length.
 
         Its `Tractions` have the traction f and stiffness S before the motion; after it the traction is f + S y.
         """
@@ -156,7 +149,7 @@ class Increment:
         sticks = np.reshape(law.has_friction and not law.adhesive and law.sticks, (-1, 1))
 
         def depth_and_path(motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return before.distance_at(x + motion) / width + 0.5, width * sticks * before.normal
+            return before.to(x + motion).distance / width + 0.5, width * sticks * before.normal
         return depth_and_path
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:

@@ -52,17 +52,17 @@ class Outline:
             nodes[k] = (a, b, middle) if left else (b, a, middle)
         self._dofs, self._own = numbers[nodes], X[nodes]
         names = vectors.dofmap.index_map.local_to_global(nodes.ravel().astype(np.int32)).reshape(-1, 3)
-        ends = self._gathered(names)[:, :2]
+        ends = gathered(forms.comm, names)[:, :2]
         self.ends = np.unique(ends, return_inverse=True)[1].reshape(-1, 2)
-        self.reference_edges = self._gathered(self._own)
+        self.reference_edges = gathered(forms.comm, self._own)
 
     def edges(self) -> np.ndarray:
         """Return start, end and midpoint of each deformed edge, shape (m, 3, 2), length; collective."""
-        return self._gathered(self._own + self._forms.length * self._forms.w.x.array[self._dofs])
+        return gathered(self._forms.comm, self._own + self._forms.length * self._forms.w.x.array[self._dofs])
 
     def mask(self, boundary: str) -> np.ndarray:
         """Return a mask of the edges that belong to a named boundary, shape (m,); collective."""
-        return self._gathered(np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
+        return gathered(self._forms.comm, np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
 
     def ordered(self, caller: str) -> list[int]:
         """Return the edge numbers in order around the body, counterclockwise.
@@ -107,9 +107,6 @@ class Outline:
         """Return True if two edges, given by their numbers, are identical, neighbours, or have a common neighbour."""
         around = np.isin(self.ends, self.ends[i]).any(1)
         return bool(np.isin(self.ends[around], self.ends[j]).any())
-
-    def _gathered(self, values: np.ndarray) -> np.ndarray:
-        return gathered(self._forms.comm, values)
 
 
 def edge_points(edges: np.ndarray, parts: int = _SEARCH_PIECES) -> np.ndarray:

@@ -95,6 +95,13 @@ class Contact(ScenePart):
             parameter (control) of the run. None: the tool is fixed.
         name: name of the contact in the stages of a `Process` and in the column names of results.
 
+    Attributes:
+        driven: True if the tool moves: its travel is then a load parameter (control) of the run.
+        friction_by_temperature: True if the coefficient of friction depends on the temperature of the body.
+        sticks: True if points in contact never slide: with "stick", and for mu of 100 or larger.
+        lagged: True for tools in three dimensions. A point whose gap closes in a step is then in contact from the next
+            step on.
+
     Raises:
         InputError: an argument is not allowed.
 
@@ -104,7 +111,7 @@ class Contact(ScenePart):
     """
 
     quantity = "travel"
-    described = ("mu",)
+    described = ("mu", "driven", "friction_by_temperature", "sticks", "lagged")
     on: str
     tool: Any
     mu: Any
@@ -118,6 +125,9 @@ class Contact(ScenePart):
             raise InputError(f"{name}: tool = {tool!r}: must be a tool from formingx.tools")
         self.on, self.tool, self.friction = check_type("Contact: on", on, str, "the name of a boundary"), tool, friction
         self.mu = coefficient(f"{name}: friction", friction)
+        self.friction_by_temperature = isinstance(self.mu, FunctionOfTemperature)
+        self.sticks = not self.friction_by_temperature and self.mu >= STICKS
+        self.driven, self.lagged = direction is not None, tool.components == 3
         three_d = self.lagged
         usually = not three_d or not self.sticks
         self.separates = check_type(f"{name}: separates", usually if separates is None else separates, bool,
@@ -147,21 +157,6 @@ class Contact(ScenePart):
         return self.name or self.on
 
     @property
-    def driven(self) -> bool:
-        """True if the tool moves: its travel is then a load parameter (control) of the run."""
-        return self.direction is not None
-
-    @property
-    def friction_by_temperature(self) -> bool:
-        """True if the coefficient of friction depends on the temperature of the body."""
-        return isinstance(self.mu, FunctionOfTemperature)
-
-    @property
-    def sticks(self) -> bool:
-        """True if points in contact never slide: with "stick", and for mu of 100 or larger."""
-        return not self.friction_by_temperature and self.mu >= STICKS
-
-    @property
     def travel_vector(self) -> np.ndarray:
         """Displacement of the tool per unit of its travel, shape (components,); 0 if the tool is fixed."""
         return np.array(self.direction or (0.0,) * self.tool.components)
@@ -170,14 +165,6 @@ class Contact(ScenePart):
     def symmetric(self) -> bool:
         """True if the contact stiffness is symmetric: contact without friction and history, which has an energy."""
         return not self.friction_by_temperature and self.mu == 0 and self.separates
-
-    @property
-    def lagged(self) -> bool:
-        """True for tools in three dimensions, whose contact is lagged.
-
-        A point whose gap closes in a step is then in contact from the next step on, not yet in this step.
-        """
-        return self.tool.components == 3
 
     def shear_limit(self, pressure: np.ndarray, mu: np.ndarray | float) -> tuple[np.ndarray, np.ndarray | float]:
         r"""Return the shear stress at which points slide; the default is Coulomb's law.

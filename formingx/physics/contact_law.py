@@ -114,12 +114,9 @@ class Motion(NamedTuple):
 
     def to(self, x: np.ndarray) -> Motion:
         """Predict distances and slips to first order at positions x, shape (n, c), length; gradients stay."""
-        slip = self.slip + np.einsum("ni,ni->n", self.along, x - self.position)
-        return Motion(x, self.distance_at(x), self.normal, slip, self.along)
-
-    def distance_at(self, x: np.ndarray) -> np.ndarray:
-        """Predict the signed distances, shape (n,), to first order at positions x, shape (n, c), length."""
-        return self.distance + np.einsum("ni,ni->n", self.normal, x - self.position)
+        distance, slip = (value + np.einsum("ni,ni->n", gradient, x - self.position) for value, gradient in
+                          ((self.distance, self.normal), (self.slip, self.along)))
+        return Motion(x, distance, self.normal, slip, self.along)
 
 
 class ContactLaw:
@@ -146,6 +143,7 @@ class ContactLaw:
         adhesive: True if points in contact can carry tension; `energy` is then the energy of the bond (`Path.work`).
         predictable: True if the law has `friction` and `depth`, as `formingx.physics.contact_law.Law`; several gaps may
             then close in one step.
+        sticks: True, or a mask of shape (n,), for points that never slide; used only with friction.
     """
 
     theta: float
@@ -155,16 +153,12 @@ class ContactLaw:
     has_history: bool = False
     adhesive: bool = False
     predictable: bool = False
+    sticks: np.ndarray | bool = False
 
     @property
     def profile(self) -> Tool | None:
         """Tool of lines and arcs, if `distance` returns its signed distance less the length `shift`; else None."""
         return None
-
-    @property
-    def sticks(self) -> np.ndarray | bool:
-        """True, or a mask of shape (n,), for points that never slide; used only with friction."""
-        return False
 
     def start(self, x: np.ndarray) -> ContactHistory:
         """Return the history variables of points at the beginning of contact analysis, before any slip.
@@ -527,7 +521,7 @@ class Law(NormalLaw):
 
     def _set_friction(self, mu: np.ndarray | float) -> None:
         """Set the coefficients of friction mu, shape () or (n,), and whether the law has friction and history."""
-        self.mu, self._slides = mu, bool(np.all(np.isfinite(mu)))
+        self.mu, self.sticks, self._slides = mu, mu >= STICKS, bool(np.all(np.isfinite(mu)))
         self.has_friction = np.ndim(mu) > 0 or bool(mu > 0)
         self.has_history = self.has_friction or self.adhesive
 
@@ -561,11 +555,6 @@ class Law(NormalLaw):
         """
         over = pressure / (self.k * self.theta)
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.adhesive else over - 1)
-
-    @property
-    def sticks(self) -> np.ndarray | bool:
-        """True, or the mask of shape (n,), for points that never slide."""
-        return self.mu >= STICKS
 
     @property
     def friction(self) -> np.ndarray:

@@ -320,7 +320,7 @@ class Problem:
         Step data, history variables, unknowns (`x`, `forms.w`) and control are set. The state has x (locally owned
         entries), control, time, setting (`StepData` as plain data, or empty) and history_variables.
         """
-        fields, control, clock = self._fields.copy(), self.control, self.forms.clock
+        fields, control, clock = self._fields.copy(), float(self._control), self.forms.clock
         stage, x = self._stage, self.x.array_r.copy()
         variables, predicted = self.history.variables, self.history.predicted
         try:

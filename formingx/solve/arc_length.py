@@ -274,9 +274,17 @@ class Curve:
              bend: Bend | None = None, equation: Constraint | None = None) -> State:
         """Return the state at an arc length from `old` (Song 1993, eqs. 4.14 to 4.31); raise `Failure` without one.
         It lies in the plane normal to the tangent, or where `equation` holds, such as "quantity = target". `earlier`
-        bends the guess to a parabola, and `bend` adds (dx, shape (n,); dcontrol)."""
+        bends the guess to a parabola, and `bend` adds (dx, shape (n,); dcontrol). Away from limit points the predictor
+        replaces the guess of x."""
         end = equation or self._plane(old, *self._predicted(old, length))
-        return self._solve_from(*self._predicted(old, length, earlier, bend), end, old, predictor)
+        x, control = self._predicted(old, length, earlier, bend)
+        if predictor is None or not self._is_away_from_limit_point(old.slope):
+            return self.solve(x, control, end, "step", old)
+        guess = predictor(control)                          # with chord iterations
+        new = self.solve(x if guess is None else guess, control, end, "step", old, chords=True)
+        if self._is_away_from_limit_point((new.control - old.control) / self.distance(old, new)):
+            return new
+        return self.solve(new.x, new.control, end, "step", old)        # a new dF/dx gives the direction of the path
 
     def _predicted(self, old: State, length: float, earlier: State | None = None,
                bend: Bend | None = None) -> tuple[Array, float]:
@@ -295,21 +303,6 @@ class Curve:
             x += bend[0]
             control += bend[1]
         return x, control
-
-    def _solve_from(self, x: Array, control: float, constraint: Constraint, old: State,
-                    predictor: Predictor | None) -> State:
-        """Return the state at which a constraint holds, solved for from the guess (x, control), x of shape (n,).
-
-        Away from limit points the predictor replaces x, and chord iterations are allowed. Near one, dF/dx is new: it
-        gives the direction of the path, from which the limit point is located.
-        """
-        if predictor is None or not self._is_away_from_limit_point(old.slope):
-            return self.solve(x, control, constraint, "step", old)
-        guess = predictor(control)
-        new = self.solve(x if guess is None else guess, control, constraint, "step", old, chords=True)
-        if self._is_away_from_limit_point((new.control - old.control) / self.distance(old, new)):
-            return new
-        return self.solve(new.x, new.control, constraint, "step", old)
 
     def _is_away_from_limit_point(self, slope: float) -> bool:
         """Return True if the control has more than half of the squared arc length; `slope`: dcontrol/ds."""

@@ -175,10 +175,10 @@ class LocalContact:
             stop near the outer edge of the ramp. If a point slides, a correction that increases the residual is halved.
         max_halvings: largest number of halvings of a correction. More halvings would stall at a kink of the law.
         kept_depth: if a correction would move a point out of the ramp, the point stops at this fraction of the depth
-            that it had in the ramp before the correction.
+            that it had in the ramp before the correction. `entry_depth` grows by its inverse from one entry to the
+            next.
         min_depth: depth in the ramp, over its width, below which a point may leave the ramp.
         entry_depth: depth in the ramp, over its width, at which a point stops when it enters the ramp again.
-        entry_growth: factor of `entry_depth` from one entry to the next.
         accuracy: tolerance of the motions of the points, over the half-width of the ramp.
     """
 
@@ -190,7 +190,6 @@ class LocalContact:
     kept_depth: float = 0.1
     min_depth: float = 1e-9
     entry_depth: float = 1e-6
-    entry_growth: float = 10.0
     accuracy: float = 1e-4
 
 
@@ -253,7 +252,7 @@ class LocalSolve:
         """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
-            law = contact.increment.predicted(contact.relative_motion(dx, step))
+            law = contact.increment.law_at(slice(None))(contact.relative_motion(dx, step))
             new = (law.status != status) & ~mark
             mark |= new
             found |= bool(new.any())
@@ -359,7 +358,7 @@ class _Points:
         leaves, enters = (before > _LOCAL.min_depth) & (depth <= 0), (before <= 0) & (depth > 0)
         stopped = np.where(leaves, _LOCAL.kept_depth * np.minimum(before, 1.0),
                            np.where(enters, np.minimum(depth, entry_depth), depth))
-        entry_depth[enters] *= _LOCAL.entry_growth
+        entry_depth[enters] /= _LOCAL.kept_depth
         back = (stopped - depth)[:, None] * path
         return new + back.ravel(), bool(back.any() or path.any(axis=1).all())
 

@@ -116,20 +116,20 @@ class ModifiedNewton:
         self.setting: StepData | None = None
         self._before, self._fall = 0.0, 1.0
 
-    def begin(self, setting: StepData | None, allowed: bool) -> None:
-        """Begin a run of Newton's method; only a tangent with the same step data is kept, and only if `allowed`."""
-        self._allowed, self._first = allowed, True
+    def begin(self, setting: StepData | None) -> None:
+        """Begin a run of Newton's method with chord iterations; only a tangent with the same step data is kept."""
+        self._first = True
         self._fall = self._before if self.setting is setting else 1.0
 
     def keeps(self, residual: float, requested: float) -> bool:
         """Return True if `Newton.max_chords` chord iterations are expected to reach the relative residual `requested`.
         """
         ahead = residual * self._fall**self._settings.max_chords
-        return self._allowed and self._fall < self._settings.max_residual_ratio and ahead < requested
+        return self._fall < self._settings.max_residual_ratio and ahead < requested
 
     def note_iteration(self, chord: bool, fall: float) -> None:
         """Note the ratio of residuals of an iteration, and whether it was a chord iteration."""
-        if self._allowed and self._first:
+        if self._first:
             self._before = fall if chord else self._before / 2
         self._fall, self._first = fall, False
 
@@ -348,7 +348,9 @@ class BorderedNewton:
         self._residual(x, control)
         self.a.set(0)
         self.reached = control, 0.0
-        self._modified.begin(problem.setting, chords and not problem.contact.faces)
+        modified = self._modified if chords and not problem.contact.faces else None
+        if modified:
+            modified.begin(problem.setting)
         work0 = moved = 0.0
         active = ActiveSetChanges(problem, self.settings.small_correction)
         points = LocalSolve(problem) if problem.contact.faces else None
@@ -356,8 +358,8 @@ class BorderedNewton:
             residual = relative(problem, self.F.norm(), self.settings.force_floor)
             if not np.isfinite(residual):
                 raise Failure(f"the forces are not finite: {problem.description.why_not_finite}", history)
-            if history:
-                self._modified.note_iteration(history[-1].chord, residual / (history[-1].residual or 1.0))
+            if modified and history:
+                modified.note_iteration(history[-1].chord, residual / (history[-1].residual or 1.0))
             if self.tolerances.converged([i.correction for i in history], [*[i.residual for i in history], residual],
                                    bool(history) and history[-1].chord, not problem.contact.faces):
                 history.append(Iteration(residual, 0.0, 0.0))
@@ -367,7 +369,7 @@ class BorderedNewton:
             if points:
                 points.mark_changes()
             self._check(history, active, moved)
-            chord = self._modified.keeps(residual, self.tolerances.residual)
+            chord = modified is not None and modified.keeps(residual, self.tolerances.residual)
             if not self._solve(x, control, chord, rescale=not history):
                 raise Failure("the tangent matrix is singular", history)
             step = self._correction(x, control, constraint, history)

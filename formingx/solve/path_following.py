@@ -90,6 +90,7 @@ class Run:
                 kept = self._continue(may_turn)
             else:
                 self._accept(self.targets.directed_to_target(start, first=not record.states))
+            self._sense = float(np.sign(self.states[0].slope)) or 1.0       # of the change of the control at the start
             self._jumps.rule = self._jumps.rule or at_limit_points(self.problem, self._is_released)
             if self._step is None or asdict(self._step) == kept.get("given"):
                 self.step = StepControl(**kept.get("step", {}))
@@ -132,11 +133,6 @@ class Run:
     def _target_is_control(self) -> bool:
         """True unless the last target is a process time and no time passes as the control of the run changes."""
         return self.targets.until.name != "process_time" or bool(self.problem.setting.rate[-1])
-
-    @property
-    def _sense(self) -> float:
-        """Sign, 1 or -1, of the change of the control at the first state of the run."""
-        return float(np.sign(self.states[0].slope)) or 1.0
 
     @property
     def _is_released(self) -> bool:

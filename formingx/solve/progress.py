@@ -31,6 +31,7 @@ class RunTargets:
         open: pairs (target, output quantity) of the targets that are still to be met.
         until: the last target.
         quantity: output quantity of the last target.
+        is_control: True if the last target is a value of the control, or of an amplitude that depends on the control.
         values: values of this quantity in the states of the run so far, in the user's units.
         patience: number of states after which a run gives up, if they changed its progress (`gained`) by less than
             1e-3.
@@ -41,13 +42,9 @@ class RunTargets:
     def __init__(self, curve: Curve, targets: Sequence[tuple[Target, Quantity]], requested: Target | None = None):
         self._curve, self.open, self._best = curve, list(targets), 0.0
         self.until, self.quantity = self.open[-1]
+        self.is_control = isinstance(self.quantity, Amplitude)
         self.values: list[float] = []
         self._ends = [target for target in (self.until, requested) if target is not None]
-
-    @property
-    def is_control(self) -> bool:
-        """True if the last target is a value of the control, or of an amplitude that depends on the control."""
-        return isinstance(self.quantity, Amplitude)
 
     def is_open(self) -> bool:
         """Return True until the last target, or the other target that ends the run (`requested`), is met."""

@@ -53,9 +53,8 @@ class SnapThrough:
         min_viscosity: value of eta below which the snap-through has failed.
         max_viscosity: largest eta before the body has begun to move.
         max_viscosity_in_motion: largest eta after the body has begun to move.
-        min_viscosity_factor: smallest factor by which eta decreases, after a viscous solution with at most
-            `max_easy_iterations` Newton iterations.
-        max_easy_iterations: largest number of Newton iterations of a viscous solution after which eta decreases.
+        max_easy_iterations: largest number of Newton iterations of a viscous solution after which eta decreases, at
+            most by the inverse of `viscosity_growth`.
         viscosity_growth: factor of eta after a failed viscous solution, before the body has begun to move.
         viscosity_growth_in_motion: factor of eta after a failed viscous solution, after the body has begun to move.
         tolerances: tolerances of a viscous solution. If contact does not settle soon, more viscosity is cheaper than
@@ -82,7 +81,6 @@ class SnapThrough:
     min_viscosity: float = 1e-9
     max_viscosity: float = 1e5
     max_viscosity_in_motion: float = 1e9
-    min_viscosity_factor: float = 0.1
     max_easy_iterations: int = 6
     viscosity_growth: float = 10.0
     viscosity_growth_in_motion: float = 3.0
@@ -218,7 +216,7 @@ class _Motion:
             limit.prepare(TrialStep(x, self.control, x - last.x, 0.0, 1.0))
         self.solved += 1
         stays, self._wait = self._wait or len(history) - 1 > settings.max_easy_iterations, False
-        return max(1.0 if stays else settings.min_viscosity_factor, far)
+        return max(1.0 if stays else 1 / settings.viscosity_growth, far)
 
     def _reject(self, grows: float = 0.0) -> float:
         """Reject a solution, and return the factor by which eta grows; `grows` 0: that of the settings."""

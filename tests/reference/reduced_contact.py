@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from formingx.contact.step_limit import LIMITS
 from formingx.extensions.contact_events.reduced_contact import StatusSearch
 from formingx.physics.contact_law import ContactStatus
 
@@ -62,7 +63,7 @@ class ReferencePoints:
             except np.linalg.LinAlgError:
                 return None
             (dN, dT), (into, along), held = self.parts(F, near), self.parts(dx, near), status != ContactStatus.FREE
-            negligible = SEARCH.limit_tolerance * (np.abs(N).max() + SEARCH.comparison_length * np.abs(dN).max())
+            negligible = SEARCH.limit_tolerance * (np.abs(N).max() + LIMITS.min_length * np.abs(dN).max())
             other, miss = status.copy(), np.zeros(len(N))
             slides = held & (status != ContactStatus.STICKS) & (mu > 0)
             turns = slides & (status * along < -SEARCH.negligible_rate * np.abs(along).max())

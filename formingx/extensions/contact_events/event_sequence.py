@@ -114,7 +114,6 @@ class EventSettings:
             are curved.
         max_surface_iterations: maximum number of Newton iterations that locate a gap closure on the surface of the
             tool.
-        max_changes: maximum number of status changes (slip, opening) between two gap closures.
         max_sliding_points: maximum number of points that slide at the accepted state. With more, their contact forces
             follow from the stiffness in the factorised tangent instead of Coulomb's law.
         sticking_tolerance: convergence tolerance of the position of a gap closure, over the tributary length of the
@@ -122,7 +121,6 @@ class EventSettings:
         sliding_tolerance: the same for points that may slide on a moving tool.
         arc_length_tolerance: convergence tolerance of the arc length of a gap closure, over its distance from the last
             event. A point near a constrained end hardly moves along its tool, so its position alone says little.
-        simultaneous_fraction: fraction of the step within which two closures count as simultaneous.
         max_replacements: maximum number of times that an earlier closure replaces the one being located.
         max_arc_length_change: largest relative change of the arc length of an event in one equilibrium iteration.
         max_work: maximum number of equilibrium iterations and status changes in the prediction of a step. If it is
@@ -132,12 +130,10 @@ class EventSettings:
     max_iterations: int = 8
     projections: int = 4
     max_surface_iterations: int = 3
-    max_changes: int = 100
     max_sliding_points: int = 80
     sticking_tolerance: float = 1e-3
     sliding_tolerance: float = 1e-2
     arc_length_tolerance: float = LARGE_ERROR
-    simultaneous_fraction: float = 0.02
     max_replacements: int = 3
     max_arc_length_change: float = 1.0
     max_work: int = 200
@@ -259,7 +255,7 @@ class ContactEventSequence:
         u = np.zeros(piece.force.shape) if moved is None else points.values_at(moved)
         targets = points.motion_to_targets(piece.positions, piece.place, near)
         force, added = points.forces_at_end(u, piece.status, near, piece.force, targets)
-        positions = piece.positions - points.motion_under(added)
+        positions = piece.positions - points.motions @ added.ravel()
         return piece._replace(positions=positions if moved is None else positions + moved, force=force,
                               extra=piece.extra + added)
 
@@ -310,7 +306,7 @@ class ContactEventSequence:
         piece = piece._replace(
             place=np.where(stuck[:, None], points.values_at(piece.positions) - slip, piece.place), status=status,
             rate=rate, growth=growth, force=np.where((status == ContactStatus.FREE)[:, None], 0.0, piece.force),
-            speed=self._along - points.motion_under(growth))
+            speed=self._along - points.motions @ growth.ravel())
         if stuck.any() and self.slip_ends == np.inf:
             slipped = np.linalg.norm(piece.place - before, axis=1)[stuck]
             lengths = points.values_at(np.concatenate([face.rule.lengths for face in self._faces]))[stuck]
@@ -342,7 +338,7 @@ class ContactEventSequence:
 
         Changes of contact statuses that come before it are appended to the path first.
         """
-        for _ in range(_SETTINGS.max_changes):
+        while True:
             last = self._pieces[-1]
             if last.begins >= length or self.exhausted:
                 return False
@@ -402,7 +398,7 @@ class ContactEventSequence:
         """
         last, closure = self._pieces[-1], self._closures[-1]
         self._end = end = last.after(closure.arc_length)
-        if closure.arc_length - last.begins < _SETTINGS.simultaneous_fraction * length:
+        if closure.arc_length - last.begins < LIMITS.start_fraction * length:
             return True
         tried: list[tuple[PathSegment, PathSegment]] = []
         for _ in range(_SETTINGS.max_iterations * _SETTINGS.max_replacements):

@@ -5,7 +5,7 @@
 #include <string.h>
 
 enum {BACK = -1, STICKS, SLIDES, FREE};                             /* `ContactStatus` */
-enum {ALL_AT_ONCE, TRIES, NONE, COMPARISON_LENGTH, LIMIT};          /* of the array `search`: `StatusSearch` */
+enum {ALL_AT_ONCE, TRIES, NONE, LIMIT, COMPARISON_LENGTH};          /* of the array `search`: `StatusSearch`, a length */
 
 /* m contact points: coefficient of friction, whether they adhere, stiffness S in the factorised tangent (m, 2, 2),
    compliance C (2 m, 2 m), unit normal (m, 2) and curvature of the tool */

@@ -28,6 +28,7 @@ from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..._jit import CFunctions
+from ...contact.step_limit import LIMITS
 from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
 from ...solve.arc_length import Curve
@@ -61,14 +62,9 @@ class BodyResponse:
         self._normal = curve.plane_normal(state)
         self._x, self._F = x, F
 
-    @property
-    def is_valid(self) -> bool:
-        """True if the stored LU factors still belong to the tangent at the state."""
-        return self._made == self._newton.solver.count
-
     def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
         """Return dx, shape (n, m), dcontrol, (m,), by forces -1 at chosen owned points; None if K changed."""
-        return self._solve(self._problem.contact.unit_forces(chosen)) if self.is_valid else None
+        return self._solve(self._problem.contact.unit_forces(chosen))
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
         """Return one modified Newton correction of (x, control), x of shape (n,), with given contact forces.
@@ -76,8 +72,6 @@ class BodyResponse:
         forces: for each face, dimensionless, added to the residual F, shape (n, 2); at NaN the law gives the force.
         None if the result is not finite, or if the stored LU factors belong to another tangent.
         """
-        if not self.is_valid:
-            return None
         self._x.array_w[:] = x
         try:
             for face, given in zip(self._problem.contact.faces, forces, strict=True):
@@ -94,9 +88,9 @@ class BodyResponse:
     def _solve(self, E: Array) -> tuple[Array, Array] | None:
         """Return dx, shape (n, m), and dcontrol, shape (m,), by changes E of the residual, owned rows, shape (n, m).
 
-        None if K with the changed stiffness of a few contact points is singular.
+        None if K with the changed stiffness of a few points is singular, or if the factors belong to another tangent.
         """
-        V = self._newton.solve_one_sided(E)
+        V = self._newton.solve_one_sided(E) if self._made == self._newton.solver.count else None
         if V is None:
             return None
         along = combined(self._problem.comm, self._normal @ V)
@@ -112,7 +106,6 @@ class StatusSearch:
             time.
         max_trials: maximum number of status sets that are tried.
         negligible_rate: fraction of the largest rate of force or motion below which a rate is negligible.
-        comparison_length: arc length by which rates of forces are multiplied to compare them with forces.
         limit_tolerance: relative distance from the Coulomb limit mu N, or from N = 0, below which a force counts as on
             it.
     """
@@ -120,12 +113,11 @@ class StatusSearch:
     simultaneous_trials: int = 6
     max_trials: int = 60
     negligible_rate: float = 1e-9
-    comparison_length: float = 1e-4
     limit_tolerance: float = 1e-6
 
 
 _SEARCH = StatusSearch()
-_VALUES = np.array(astuple(_SEARCH), dtype=float)
+_VALUES = np.array([*astuple(_SEARCH), LIMITS.min_length])      # rates of forces times this length are forces
 _C = CFunctions("extensions/contact_events/reduced_contact.c")
 
 
@@ -312,14 +304,6 @@ class CondensedPoints:
             found[:, k] = *near.normal.T, *near.tangent.T, near.curvature, beyond
         return np.concatenate([found[:2].T.ravel(), found[2:4].T.ravel(), *found[4:]])
 
-    def parts(self, force: np.ndarray, near: ToolFrame) -> tuple[np.ndarray, np.ndarray]:
-        """Return the components of vectors, shape (m, 2), normal and tangential to the tools, shape (m,) each."""
-        return np.einsum("ni,ni->n", force, near.normal), np.einsum("ni,ni->n", force, near.tangent)
-
-    def motion_under(self, forces: np.ndarray) -> np.ndarray:
-        """Return the motion, shape (n, 2), length, of the n owned points under forces, shape (m, 2)."""
-        return self.motions @ forces.ravel()
-
     def forces_at_end(self, u: np.ndarray, status: np.ndarray, near: ToolFrame, force: np.ndarray,
                       to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Compute the contact forces F after a motion u of the m points at constant forces, and F - `force` - S dx.
@@ -341,7 +325,7 @@ class CondensedPoints:
         v: velocities. force: shape (m, 2).
         """
         slack = (status != ContactStatus.FREE) & ~self._pulls
-        F, outside, N = np.empty(force.shape), np.empty(force.shape), self.parts(force, near)[0]
+        F, outside, N = np.empty(force.shape), np.empty(force.shape), np.einsum("ni,ni->n", force, near.normal)
         slack &= np.abs(N).max(initial=0.0) * _SEARCH.limit_tolerance >= N
         given = *self._arguments(near), u, force, status, _VALUES
         for found in (np.array(status, dtype=int), np.where(slack, ContactStatus.FREE, status).astype(int)):
