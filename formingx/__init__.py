@@ -91,6 +91,7 @@ with _optional():
 with _optional():
     from .extensions.space import checks as _space_checks
     from .extensions.space import edge_checks as _edge_checks
+    from .extensions.space import layer_checks as _layer_checks
     from .extensions.space import mould_checks as _mould_checks
     from .extensions.space import tool_checks as _tool_checks
     from .extensions.space.names import MESHES, TOOLS

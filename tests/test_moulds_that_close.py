@@ -455,6 +455,18 @@ def test_parts_that_are_blown_round_the_eye_of_a_handle_end_the_run():
         fx.Process(closing).run(stages, progress=False)
 
 
+@pytest.mark.parametrize("part, travel, depth", [
+    ("whole", 50.0, "8.08 beyond"), ("whole", 30.0, ""), ("half", 50.0, "")])
+def test_a_tool_that_reaches_the_opposite_layer_is_named(part, travel, depth):
+    """A plate closes on a tube of radius 16. A half tube has no opposite layer; its plane of symmetry stands for it."""
+    plate = fx.tools.extruded(fx.Tool([(0.0, 50.0), (0.0, -250.0)])).moved(x=30.0)
+    closing = fx.Scene(mesh=fx.mesh.tube(radius=16.0, length=60.0, elements=(6, 8), part=part), thickness=2.5,
+                       materials=MELT, supports=[fx.Clamped("neck"), *SYMMETRIES[part]],
+                       contacts=[fx.Contact("outer", plate, "stick", direction=(-1, 0, 0), name="plate")])
+    found = [f.text for f in fx.check(closing, targets=[fx.travel(travel)]).findings if "opposite layer" in f.text]
+    assert len(found) == bool(depth) and all(depth in text and "(-11.92, 11.92, 0)" in text for text in found)
+
+
 @pytest.mark.thorough
 def test_k_bkz_tube_is_the_solid_ring_in_plane_strain():
     """A ring of a thin wall in plane strain, blown by a constant flow: the pressure by time of the solid, H/R apart."""
