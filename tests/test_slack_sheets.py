@@ -3,7 +3,8 @@
 import pytest
 
 import formingx as fx
-from formingx.extensions.space.checks import slack_sheet
+from formingx.extensions.space.checks import slack_part, slack_sheet
+from formingx.mesh.triangles import place
 from formingx.solve.diagnose import FailedRun
 
 RELAXING = fx.Viscoelastic(fx.NeoHookean(c10=0.04), [(0.15, 0.5)])
@@ -45,3 +46,15 @@ def test_a_failed_run_of_a_slack_sheet_advises_a_duration(material, duration, co
     failed = FailedRun({"control": control, "what": "vacuum pressure"}, path.problem, path.last, target=0.09)
     found = list(slack_sheet(failed))
     assert len(found) == told and all("Stage(..., duration=...)" in finding.advice for finding in found)
+
+
+@pytest.mark.parametrize("wrinkles, z, told", [(0.01, -50.0, True), (0.01, -20.0, False), (None, -50.0, False)])
+def test_a_failed_run_names_a_slack_part_of_a_tube(wrinkles, z, told):
+    """The tail of an open tube below the part under pressure carries no load."""
+    mesh = fx.mesh.tube(radius=16.0, length=60.0, elements=(12, 3), part="quarter")
+    scene = fx.Scene(mesh=mesh, thickness=2.5, materials=fx.NeoHookean(c10=0.05), model=fx.Membrane(wrinkles=wrinkles),
+                     supports=[fx.Clamped("neck"), *HELD[1:]], loads=[fx.Pressure("inner", above=-30.0)])
+    path = fx.trace(scene, until=fx.enclosed_volume(100.0), progress=False)
+    failed = FailedRun({"worst": place(mesh, (0.0, 16.0, z))}, path.problem, path.last)
+    found = list(slack_part(failed))
+    assert len(found) == told and all(f"slack at (x, y, z) = (0, 16, {z:g})" in finding.text for finding in found)

@@ -1,11 +1,13 @@
 """Checks of membranes in three dimensions."""
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
 from ...contact import resultants
+from ...errors import InputError
 from ...findings import Finding, percent, register
 from ...mesh.nodes import nearest
 from ...physics.supports import Symmetry
@@ -14,6 +16,7 @@ from ...values.tolerances import NEGLIGIBLE
 from .lagged_steps import LAGGED
 from .passed_tools import PassedTool
 from .solid_tool import Swept
+from .stress import stress_of
 from .surface import smaller_stress
 
 _UNBALANCED = 0.02         # share of the resultant of the loads that supports and tools may miss
@@ -21,6 +24,9 @@ _UNBALANCED = 0.02         # share of the resultant of the loads that supports a
 _LEAST_RESULTANT = 1e-3    # of loads, over the sum of the forces at all nodes, to which missed forces are compared
 
 _SLACK = 1e-4              # pressure over its target below which a sheet carries no load yet
+
+_LITTLE_TENSION, _NO_TENSION = 0.1, 0.01
+"""Larger and smaller principal force in a slack part of a sheet, at most, over the largest one in the sheet."""
 
 _LARGE_WALL_ERROR = 0.2
 """Estimated error of the minimum wall over this wall above which a run warns of it."""
@@ -175,3 +181,30 @@ def slack_sheet(failure: Any) -> Iterator[Finding]:
                       f" {facts['what']} = {facts['control']:.3g}, and no time passes in this stage, so nothing holds"
                       f" its folds", "a duration for this stage, Stage(..., duration=...), in which the sheet resists"
                                      " by its viscosity")
+
+
+@register("failure")
+def slack_part(failure: Any) -> Iterator[Finding]:
+    """Yield a finding if the largest out-of-balance force is at a slack part of a sheet; collective.
+
+    With relaxed energy such a part carries no tension in one direction, and little in the other. Its tangent is nearly
+    singular.
+    """
+    problem, worst = failure.problem, failure.facts.get("worst")
+    scene = problem.scene
+    if failure.last is None or worst is None or scene.kinematics.components != 3 or scene.model.wrinkles is None:
+        return
+    try:
+        stress = stress_of(SimpleNamespace(problem=problem, scene=scene), failure.last, None)
+    except InputError:                                       # K-BKZ
+        return
+    wall, forces = stress.wall, stress.resultants
+    node = int(np.argmin(np.linalg.norm(wall.reference_points - worst.position, axis=1)))
+    larger, smaller = forces[(wall.triangles == node).any(1)].T / max(float(forces.max()), 1e-300)
+    slack = (larger < _LITTLE_TENSION) & (smaller < _NO_TENSION)
+    if slack.any():
+        yield Finding("serious", "membrane", f"the sheet is slack at {worst}, where the largest out-of-balance force"
+                      f" is: its tension there is {percent(max(larger[slack].max(), 0.0))} of the largest one, and with"
+                      f" wrinkles={scene.model.wrinkles:g} nothing else holds its folds",
+                      "Membrane() without wrinkles=, which resists compression; or a support or a load that keeps this"
+                      " part taut, or a mesh without it")
