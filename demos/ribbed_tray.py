@@ -74,8 +74,8 @@ def flat(size):
 def form(sheet, mould):
     """Return the path of plug and vacuum."""
     plug = fx.tools.box(half=(52, 27), depth=30, corner=15, fillet=8, draft=5, mouth=30.5, plug=True)
-    contacts = [fx.Contact("bottom", mould, "stick", name="mould", nodes_per_step=2),
-                fx.Contact("top", plug, "stick", direction=(0, 0, -1), name="plug", nodes_per_step=2)]
+    contacts = [fx.Contact("bottom", mould, "stick", name="mould", nodes_per_step=0.02),
+                fx.Contact("top", plug, "stick", direction=(0, 0, -1), name="plug", nodes_per_step=0.02)]
     scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=[fx.SimplySupported("rim")],
                      loads=[fx.Pressure("top", name="vacuum")], contacts=contacts, model=fx.Membrane(wrinkles=0.01))
     stages = [fx.Stage("plug", control="plug", until=fx.travel(PLUG_TRAVEL), speed=60.0),

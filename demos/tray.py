@@ -85,7 +85,7 @@ def main():
     summary["frictionless"] = {}
     for size in sizes[:2]:
         slid = summary["frictionless"][f"size_{size:g}"] = key_numbers(tray(
-            size, mould, friction="none", separates=True, nodes_per_step=3))
+            size, mould, friction="none", separates=True, nodes_per_step=0.03))
         say(f"without friction, size {size:g}: " + ", ".join(f"{k} {v:.5g}" for k, v in slid.items()))
     path.wall().to_csv(args.out / "wall.csv")
     if not args.quick:

@@ -437,14 +437,23 @@ def test_an_adhering_plate_pulls_a_block_in_uniaxial_tension(friction):
     (lambda: scene_with(fx.Contact("bottom", tools.plane(0.2))), "behind this face"),
     (lambda: scene_with(fx.Contact("top", tools.plane(0.2)), "top"), "no tool faces the pressure"),
     (lambda: scene_with(fx.Contact("lid", tools.plane(0.2))), "not known"),
+    (lambda: fx.Contact("top", TOOL, nodes_per_step=1.5), "must be a whole number"),
+    (lambda: fx.Contact("top", tools.box(half=(1, 1), depth=1), nodes_per_step=2), r"below 1, such as 0\.02"),
 ])
 def test_bad_contacts(change, message):
     with pytest.raises(fx.InputError, match=message):
         change()
 
 
+@pytest.mark.parametrize("nodes, closures", [(None, 1), (3, 3), (0.3, 5), (0.01, 1)])
+def test_a_step_closes_a_number_or_a_share_of_the_gaps_of_a_face(nodes, closures):
+    """A face of 8 edges has 17 nodes."""
+    approach, = Problem(scene_with(fx.Contact("top", tools.plane(0.2), nodes_per_step=nodes))).contact.limit._all
+    assert (approach.points, approach.max_closures) == (17, closures)
+
+
 def scene_with(contact, pressed="bottom"):
-    return fx.Scene(mesh=fx.mesh.disc(radius=1, thickness=0.1, elements=(4, 1)), materials=fx.NeoHookean(c10=1.0),
+    return fx.Scene(mesh=fx.mesh.disc(radius=1, thickness=0.1, elements=(8, 1)), materials=fx.NeoHookean(c10=1.0),
                     supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure(pressed)], contacts=[contact])
 
 

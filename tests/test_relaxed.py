@@ -98,11 +98,11 @@ def test_a_cubic_in_time_is_predicted_exactly():
     def state(time, **kind):
         return State(np.array([time**3 - time, 2.0]), 0.0, np.zeros(2), 1.0, time=time, **kind)
     states = [state(t) for t in (0.0, 0.3, 0.7, 1.2, 1.2 + 1e-9)]
-    past = predictor.recent_states(states, 1.6, predictor.CUBIC)
+    past = predictor.recent_states(states, 1.6, degree=3)
     assert [s.time for s in past] == [0.0, 0.3, 0.7, 1.2 + 1e-9]
     assert predictor.weights(past, 1.6) @ [s.x for s in past] == pytest.approx([1.6**3 - 1.6, 2.0], rel=1e-12)
     states[2] = state(0.7, kind="jump")
-    assert [s.time for s in predictor.recent_states(states, 1.6, predictor.CUBIC)] == [0.7, 1.2 + 1e-9]
+    assert [s.time for s in predictor.recent_states(states, 1.6, degree=3)] == [0.7, 1.2 + 1e-9]
 
 
 @pytest.mark.thorough

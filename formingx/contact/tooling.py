@@ -102,7 +102,7 @@ def tool_of(shape: dict[str, Any]) -> Any:
 def _contact(data: dict[str, Any]) -> Contact:
     """Return the `Contact` that plain data describe, {name of an attribute: its value}."""
     direction = data["direction"] and tuple(data["direction"])
-    names = ("penalty", "ramp", "elastic_slip", "separates", "nodes_per_step", "points", "name")
+    names = ("penalty", "ramp", "elastic_slip", "separates", "points", "name")
     options = {name: data[name] for name in names if name in data}
     friction = data["friction"]
     if isinstance(friction, dict):                          # a function of the temperature is stored as plain data

@@ -35,9 +35,9 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import InputError, check_type, count, pair, positive, triple
+from ..errors import InputError, check_type, pair, positive, triple
 from ..values.temperature import FunctionOfTemperature
-from .contact_arguments import coefficient, contact_points
+from .contact_arguments import closures, coefficient, contact_points
 from .contact_law import RAMP_EDGE, STICKS, ContactLaw, Law
 from .part import ScenePart
 
@@ -81,11 +81,11 @@ class Contact(ScenePart):
             sheet, or a plug to which the sheet is bonded. The default is True. In three dimensions the default for
             "stick" is False: a point stays in contact until a stage of a process makes the tool inactive. With True,
             points under tension separate there, for materials that do not relax.
-        nodes_per_step: largest number of nodes that come into contact in one step; an element edge has two nodes. The
-            results of stick, friction and heat exchange depend on the time of contact. In a section None means 1. If
-            any face sticks, None means 5 % of the nodes of each face with stick or friction, in the predicted order of
-            their gap closures. In three dimensions the argument is a percentage of the nodes of the face, and None
-            means 1 %. Without stick, friction, bond and heat exchange ten times more nodes may come into contact.
+        nodes_per_step: largest number of nodes that come into contact in one step, or their share of the nodes of the
+            face, below 1. The results of stick, friction and heat exchange depend on the time of contact. In three
+            dimensions it must be a share; None means 0.01. In a section None means 1 node; an element edge has two.
+            If any face sticks, None means the share 0.05 on each face with stick or friction, in the predicted order of
+            the gap closures. Without stick, friction, bond and heat exchange ten times more nodes come into contact.
         present_area: True: the penalty refers to area and wall thickness at the beginning of a step, instead of the
             reference configuration. A sheet that is drawn 20 times thinner then penetrates as little as an undeformed
             one. Only without friction. The penetration then depends on the steps.
@@ -118,7 +118,7 @@ class Contact(ScenePart):
 
     def __init__(self, on: str, tool: Any, friction: Any = "stick", *, penalty: float | None = None,
                  ramp: float | None = None, elastic_slip: float = _ELASTIC_SLIP, separates: bool | None = None,
-                 nodes_per_step: int | None = None, points: str | int = "nodes",
+                 nodes_per_step: float | None = None, points: str | int = "nodes",
                  present_area: bool = False, direction: tuple[float, ...] | None = None, name: str | None = None):
         self.name, name = name, f"Contact({on!r})"
         if isinstance(tool, type) or not hasattr(tool, "signed_distance"):
@@ -139,7 +139,7 @@ class Contact(ScenePart):
         if not self.separates and not three_d and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: a point that pulls at the tool has"
                              f" no Coulomb friction; use 'stick' or 'none'")
-        self.nodes_per_step = None if nodes_per_step is None else count(f"{name}: nodes_per_step", nodes_per_step)
+        self.nodes_per_step = closures(f"{name}: nodes_per_step", nodes_per_step, three_d)
         self.points = contact_points(f"{name}: points", points)
         self.present_area = check_type(f"{name}: present_area", present_area, bool, "True or False")
         if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):

@@ -1,9 +1,9 @@
-"""Checks of the arguments `friction` and `points` of a `Contact`."""
+"""Checks of the arguments `friction`, `points` and `nodes_per_step` of a `Contact`."""
 
 import math
 from typing import Any
 
-from ..errors import InputError, count, non_negative
+from ..errors import InputError, count, non_negative, positive
 from ..values.table import Table
 from ..values.temperature import FunctionOfTemperature
 
@@ -31,6 +31,22 @@ def coefficient(name: str, friction: Any) -> Any:
         raise InputError(f"{name} = {friction!r}: must be 'stick', 'none' or a coefficient of friction: a number"
                          f" or, by temperature, table({{T: mu, ...}}) or of_temperature(f)")
     return non_negative(name, friction)
+
+
+def closures(name: str, nodes: Any, in_space: bool) -> int | float | None:
+    """Return `nodes_per_step`: None, a number of nodes from 1, or a share of the nodes of the face below 1.
+
+    Raise `InputError` for another value, and for a number of nodes in three dimensions.
+    """
+    if nodes is None:
+        return None
+    if positive(name, nodes) < 1:
+        return float(nodes)
+    number = count(name, nodes)
+    if in_space:
+        raise InputError(f"{name} = {nodes!r}: must be a share of the nodes of the face in three dimensions, below 1,"
+                         f" such as {min(number / 100, 0.5):g}")
+    return number
 
 
 def contact_points(name: str, points: Any) -> str | int:

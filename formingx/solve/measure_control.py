@@ -134,8 +134,8 @@ class QuantityRun(Run):
         if length < _STEPS.min_control_change:
             return new
         if self.problem.history.rate_dependent:
-            before = _rate([*predictor.recent_states(self.states[:-1], old.time, 2), old])
-            after, step = _rate([*predictor.recent_states(self.states, new.time, 2), new]), new.time - old.time
+            before = _rate([*predictor.recent_states(self.states[:-1], old.time, degree=1), old])
+            after, step = _rate([*predictor.recent_states(self.states, new.time, degree=1), new]), new.time - old.time
         else:                                                # the tangents of the path show an extremum
             before, after, step = old.slope, new.slope, length
         still = _STEPS.min_control_change * max(abs(old.control), abs(new.control)) / step
@@ -160,7 +160,7 @@ class QuantityRun(Run):
         With a single state it is the point on its tangent at which the quantity has the prescribed `value` (user's
         units).
         """
-        past = predictor.recent_states(self.states, time, predictor.CUBIC - bool(self.problem.contact.faces))
+        past = predictor.recent_states(self.states, time, degree=2 if self.problem.contact.faces else 3)
         if len(past) == 1:
             return self._on_tangent(old, value)
         w = predictor.weights(past, time)

@@ -294,7 +294,7 @@ class Run:
 
         def x(control: float) -> Array | None:
             time = self.problem.history.time_at(control)
-            past = predictor.recent_states(self.states, time, predictor.CUBIC)
+            past = predictor.recent_states(self.states, time, degree=3)
             return predictor.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
         return x
 

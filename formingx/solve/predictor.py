@@ -9,11 +9,9 @@ import numpy as np
 from .equations import Array
 from .state import State
 
-CUBIC, QUADRATIC = 4, 3                             # states that a cubic, and a parabola, go through
 
-
-def recent_states(states: Sequence[State], time: float, most: int, close: float = 0.1) -> list[State]:
-    """Return at most `most` last states, none before the last jump, for an extrapolation to a later time.
+def recent_states(states: Sequence[State], time: float, degree: int, close: float = 0.1) -> list[State]:
+    """Return the last degree + 1 states, fewer after a jump, for an extrapolation by a polynomial to a later time.
 
     States closer in time than `close` times the step are left out, since they would magnify errors.
     """
@@ -21,7 +19,7 @@ def recent_states(states: Sequence[State], time: float, most: int, close: float 
     for state in reversed(states):
         if not found or state.time < found[0].time - close * (time - states[-1].time):
             found.insert(0, state)
-        if len(found) == most or state.kind == "jump":
+        if len(found) > degree or state.kind == "jump":
             break
     return found
 

@@ -109,7 +109,7 @@ class TimeError:
         """Return the error of a step, at its end or persistent, over its tolerance; x: shape (n,). 0 if no time passes.
         """
         time = self._problem.history.time_at(control)
-        past = predictor.recent_states(states, time, predictor.QUADRATIC - 1)
+        past = predictor.recent_states(states, time, degree=1)
         end = State(x, control, x, 0.0, time=time)
         middle = (past[-1].time + time) / 2
         share = predictor.weights([*past, end], middle) if time > past[-1].time else np.array([])

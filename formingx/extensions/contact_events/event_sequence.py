@@ -110,31 +110,24 @@ class EventSettings:
 
     Attributes:
         max_iterations: maximum number of equilibrium iterations per event.
-        projections: number of projections of closed points onto their tools, which converge in a few steps if the tools
-            are curved.
-        max_surface_iterations: maximum number of Newton iterations that locate a gap closure on the surface of the
-            tool.
+        surface_iterations: number of projections of closed points onto their tools, and maximum number of Newton
+            iterations that locate a gap closure there. Both converge in a few steps if the tools are curved.
         max_sliding_points: maximum number of points that slide at the accepted state. With more, their contact forces
             follow from the stiffness in the factorised tangent instead of Coulomb's law.
-        sticking_tolerance: convergence tolerance of the position of a gap closure, over the tributary length of the
+        position_tolerance: convergence tolerance of the position of a gap closure, over the tributary length of the
             point. Most points with Coulomb friction stick near this position, too.
-        sliding_tolerance: the same for points that may slide on a moving tool.
         arc_length_tolerance: convergence tolerance of the arc length of a gap closure, over its distance from the last
             event. A point near a constrained end hardly moves along its tool, so its position alone says little.
-        max_replacements: maximum number of times that an earlier closure replaces the one being located.
         max_arc_length_change: largest relative change of the arc length of an event in one equilibrium iteration.
         max_work: maximum number of equilibrium iterations and status changes in the prediction of a step. If it is
             reached, the prediction is not used, and the step closes one gap.
     """
 
     max_iterations: int = 8
-    projections: int = 4
-    max_surface_iterations: int = 3
+    surface_iterations: int = 4
     max_sliding_points: int = 80
-    sticking_tolerance: float = 1e-3
-    sliding_tolerance: float = 1e-2
+    position_tolerance: float = 1e-3
     arc_length_tolerance: float = LARGE_ERROR
-    max_replacements: int = 3
     max_arc_length_change: float = 1.0
     max_work: int = 200
 
@@ -238,7 +231,7 @@ class ContactEventSequence:
         piece = piece.extended(m).after(length)
         if not len(piece.status):
             return None
-        for _ in range(_SETTINGS.projections):
+        for _ in range(_SETTINGS.surface_iterations):
             piece = self._projected(piece)
         if not np.isfinite(piece.extra).all():
             return None
@@ -383,11 +376,10 @@ class ContactEventSequence:
         if rank == self._comm.rank:
             face, row = self._faces[f], self._points.starts[f] + i
             x, w = positions[row], self._pieces[-1].speed[row]
-            ds = face.law.gap_closure(i, x, w, self._pieces[-1].begins - s, _SETTINGS.sticking_tolerance,
-                                      _SETTINGS.max_surface_iterations)
-            slides = face.moves and not self._points.sticks[row]
-            tolerance = _SETTINGS.sliding_tolerance if slides else _SETTINGS.sticking_tolerance
-            closure = GapClosure(s + ds, rank, f, i, x + ds * w, tolerance * float(face.rule.lengths[i]))
+            ds = face.law.gap_closure(i, x, w, self._pieces[-1].begins - s, _SETTINGS.position_tolerance,
+                                      _SETTINGS.surface_iterations)
+            tolerance = _SETTINGS.position_tolerance * float(face.rule.lengths[i])
+            closure = GapClosure(s + ds, rank, f, i, x + ds * w, tolerance)
         return closure if self._comm.size == 1 else self._comm.bcast(closure, root=rank)
 
     def _equilibrate(self, length: float) -> bool:
@@ -401,9 +393,7 @@ class ContactEventSequence:
         if closure.arc_length - last.begins < LIMITS.start_fraction * length:
             return True
         tried: list[tuple[PathSegment, PathSegment]] = []
-        for _ in range(_SETTINGS.max_iterations * _SETTINGS.max_replacements):
-            if len(tried) == _SETTINGS.max_iterations or self.exhausted:
-                return False
+        while len(tried) < _SETTINGS.max_iterations and not self.exhausted:
             closure = self._closures[-1]
             moved = self._iterated(closure.arc_length, end)
             if moved is None:

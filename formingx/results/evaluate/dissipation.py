@@ -28,7 +28,7 @@ def dissipated_energy(segment: Segment, states: list[State], power: Quantity) ->
     if state.setting["rate"][-1]:
         x, control = segment.curve.interpolate(before, state, 0.5)
     else:                                                    # time passes, independent of the control: no tangents
-        past = [*predictor.recent_states(states[:-1], time, predictor.CUBIC - 1), state]
+        past = [*predictor.recent_states(states[:-1], time, degree=2), state]
         weights = predictor.weights(past, time)
         x, control = weights @ [s.x for s in past], float(weights @ [s.control for s in past])
     with segment.problem.state_context(before) as problem:
