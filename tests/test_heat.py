@@ -201,7 +201,7 @@ TWO = {"core": D / 2, "skin": D / 2}
 SKIN = fx.ThermalProperties(conductivity=0.4, density=900.0, heat_capacity=2100.0)
 
 
-@pytest.mark.parametrize("kinematics", [fx.Axisymmetric(), fx.PlaneStrain()])
+@pytest.mark.parametrize("kinematics", [fx.Axisymmetric(), pytest.param(fx.PlaneStrain(), marks=pytest.mark.thorough)])
 def test_heat_stored_is_heat_given(kinematics):
     mesh = fx.mesh.disc(radius=5e-3, thickness=TWO, elements=(3, 2))
     run = fx.heat(mesh, {"core": SHEET, "skin": SKIN}, everything(), start=25.0, times=[1.0, 5.0], unit="C",
