@@ -1,5 +1,7 @@
 """Tools that are made of several parts: one contact, distances, filling and forces by part."""
 
+import re
+
 import numpy as np
 import pytest
 
@@ -31,7 +33,8 @@ def test_distance_to_parts_is_the_nearest(tmp_path):
     np.testing.assert_array_equal(tool.nearest_parts(x), nearest)
     np.testing.assert_allclose(found.normal, np.where(nearest[:, None] == 0, each[0].normal, each[1].normal))
     assert len(set(nearest)) == 2 and tool.names == ["part 1", "part 2"]
-    np.testing.assert_allclose(tool_of(plain(tool)).signed_distance(x), tool.signed_distance(x), atol=1e-14)
+    for each in (tool, fx.tools.union(BOX, RIB, fillet=0.2)):
+        np.testing.assert_allclose(tool_of(plain(each)).signed_distance(x), each.signed_distance(x), atol=1e-14)
     points, triangles = tool.surface()
     assert len(points) == sum(len(part.surface()[0]) for part in apart) and triangles.max() == len(points) - 1
 
@@ -56,3 +59,18 @@ def test_no_point_of_the_sheet_lies_inside_a_part(friction):
     assert rib[0][-1] > 0.03 and filling.gap[-1] < 0.1
     np.testing.assert_allclose(4 * (box[1] + rib[1])[-1, 2], path["tool_force"][-1], rtol=1e-8)
     assert filling.columns["rib_force"][-1] < 0
+
+
+def test_report_names_the_parts_of_tools(tmp_path, monkeypatch):
+    """The report has a row for each part of a union, with its share of the contact and the force on it."""
+    monkeypatch.setattr("formingx.extensions.space.show.view", lambda *arguments: None)
+    path, _ = form("stick")
+    text = path.report(tmp_path / "report.html").read_text()
+    table = text[text.index("<h2>Parts of tools</h2>"):].split("</table>")[0]
+    rows = [re.sub("<[^>]*>", " ", row).split() for row in table.split("<tr>") if "mould" in row]
+    assert [row[:3] for row in rows] == [["mould", "box", "run"], ["mould", "rib", "run"]]
+    shares, forces = ([float(row[k].rstrip("%")) for row in rows] for k in (3, 4))
+    filling = path.filling("mould")
+    assert sum(shares) == pytest.approx(100 * filling.touching[-1], abs=0.11)
+    assert sum(forces) == pytest.approx(path["tool_force"][-1], rel=1e-3)
+    assert forces[1] == pytest.approx(4 * filling.columns["rib_force"][-1], rel=1e-3)

@@ -28,7 +28,7 @@ class _StoredFileTool(SolidTool):
 def _tool(shape: dict[str, Any]) -> SolidTool:
     """Return a tool from the data of a checkpoint, {attribute of the tool: value}, such as {"name": "mould.stl"}."""
     if "parts" in shape:
-        found: SolidTool = Union([_tool(part) for part in shape["parts"]], shape["names"])
+        found: SolidTool = Union([_tool(part) for part in shape["parts"]], shape["names"], shape.get("fillet", 0.0))
     elif "first" in shape:
         found = Intersection(_tool(shape["first"]), _tool(shape["second"]), shape["fillet"])
     elif "position" in shape:

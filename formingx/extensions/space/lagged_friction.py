@@ -75,7 +75,7 @@ class LaggedFriction(LaggedStick):
     def __init__(self, tool: Any, mu: np.ndarray | float, k: Any, theta: float, elastic_slip: float):
         super().__init__(tool, k, theta, True)
         self.mu, self.elastic_slip = mu, elastic_slip
-        self._last: tuple[np.ndarray, Distances] | None = None
+        self._last: list[tuple[np.ndarray, Distances]] = []         # distances asked for last, and where
         self._pressure_ahead: tuple[ContactHistory, np.ndarray] | None = None
 
     def part(self, points: np.ndarray | slice) -> LaggedFriction:
@@ -195,11 +195,14 @@ class LaggedFriction(LaggedStick):
     def _distances(self, x: np.ndarray) -> Distances:
         """Return distances, normals and Hessians at positions x, shape (n, 3), length.
 
-        The last result is stored, and returned again for the same positions.
+        The last four results are stored, and returned again for the same positions.
         """
-        if self._last is None or not np.array_equal(self._last[0], x):
-            self._last = x.copy(), self.tool.distances(x)
-        return self._last[1]
+        for positions, found in self._last:
+            if np.array_equal(positions, x):
+                return found
+        found = self.tool.distances(x)
+        self._last = [(x.copy(), found), *self._last[:3]]
+        return found
 
 
 class _Tractions(Tractions):

@@ -186,15 +186,15 @@ class SheetFilling(ColumnTable):
         return found
 
 
-def filling(path: Any, contact: Any) -> SheetFilling:
-    """Return the filling of a tool by the sheet in all states of a run; collective.
+def filling(path: Any, contact: Any, states: Any = None) -> SheetFilling:
+    """Return the filling of a tool by the sheet in some states of a run, all by default; collective.
 
     In each state: the share of the sheet's area that touches the tool, and the largest distance from it.
     """
-    rows, comm = [], path.problem.comm
+    rows, comm, states = [], path.problem.comm, path.states if states is None else states
     tool = contact.contact.tool
     names = tool.names if isinstance(tool, Union) else []
-    for state in path.states:
+    for state in states:
         with path.problem.state_context(state) as problem:
             fields = problem.x.array_r
             x = contact.positions(fields, state.control)
@@ -213,5 +213,6 @@ def filling(path: Any, contact: Any) -> SheetFilling:
     table = np.array(rows)
     each = table[:, 2:].reshape(len(table), -1, 4)
     name = path.columns[0]
-    return SheetFilling((name, path[name]), table[:, 0], table[:, 1], comm,
+    control = np.array([state.measures[name] for state in states])
+    return SheetFilling((name, control), table[:, 0], table[:, 1], comm,
                         {part: (each[:, k, 0], each[:, k, 1:]) for k, part in enumerate(names)})

@@ -18,7 +18,7 @@ from ...results.show import interactive, page
 from ...results.show.attempts import Attempts
 from ...results.show.interactive import rounded
 from ...results.show.report import PROCESS, finding_element, introduction, jumps, scripts, versions
-from ...results.show.report_data import of_path
+from ...results.show.report_data import of_path, words
 from ...results.show.views import camera_direction, look, plotted, shading
 from ...scene.summary import summary
 from ...units import Units
@@ -178,7 +178,8 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
     ends = [next(s for s in reversed(path.states) if s.stage == name) for name in names]
     body += ["<h2>Stages</h2>", page.table(["stage", *(units.label(c) for c in columns)], [
         [state.stage or "run", *(page.number(state.measures[c]) for c in columns)] for state in ends])]
-    body += [jumps(record), "<h2>Inputs</h2>",
+    body += [attempts.make("the table of parts of tools", lambda: _parts_of_tools(path, ends, units), ""),
+             jumps(record), "<h2>Inputs</h2>",
              page.table(["", ""], [[k, v] for k, v in summary(path.problem.scene).items()]),
              "<h2>Made with</h2>", page.table(["", ""], versions([record]))]
 
@@ -188,6 +189,24 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
         files.replace(file, lambda stream: stream.write(text))
     files.on_root(comm, make)
     return FilePath(file)
+
+
+def _parts_of_tools(path: Any, states: list[Any], units: Units) -> str:
+    """Return an HTML table of the parts of unions in some states, with their share of the contact; "" without unions.
+
+    Forces are those of the whole part, along the travel of the tool, or along z if it is fixed.
+    """
+    from .part import filling
+    rows, factor = [], path.scene.symmetry_factor
+    for face in path.problem.contacts:
+        contact = face.contact
+        way = contact.travel_vector if contact.direction is not None else np.array([0.0, 0.0, -1.0])
+        found = filling(path, face, states) if hasattr(contact.tool, "names") else None
+        for name, (touching, force) in found.parts.items() if found else ():
+            rows += [[contact.label, name, words(state.stage) or "run", f"{share:.1%}", page.number(value)]
+                     for state, share, value in zip(states, touching, -factor * force @ way)]
+    head = ["tool", "part", "end of", "share of the body that touches it", units.label("force", "force on it")]
+    return "<h2>Parts of tools</h2>" + page.table(head, rows) if rows else ""
 
 
 def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
