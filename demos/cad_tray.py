@@ -95,8 +95,8 @@ def plugs():
 
 def form(sheet, mould, share=1.0):
     """Return the path of plug and vacuum, or of a share of both, on the mesh of a quarter of the sheet."""
-    contacts = [fx.Contact("bottom", mould, FRICTION, name="mould"),
-                fx.Contact("top", plugs(), FRICTION, direction=(0, 0, -1), name="plug")]
+    contacts = [fx.Contact("bottom", mould, FRICTION, nodes_per_step=3, name="mould"),
+                fx.Contact("top", plugs(), FRICTION, direction=(0, 0, -1), nodes_per_step=3, name="plug")]
     scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=HELD, contacts=contacts,
                      loads=[fx.Pressure("top", name="vacuum")], model=fx.Membrane(wrinkles=0.01))
     stages = [fx.Stage("plug", control="plug", until=fx.travel(share * PLUG_TRAVEL), speed=80.0),
@@ -135,7 +135,7 @@ def ball_of_triangles(file, radius):
 
 def main():
     options = parser("cad_tray", __doc__)
-    options.add_argument("--size", type=float, default=4.0, help="size of the triangles of the first mesh, mm")
+    options.add_argument("--size", type=float, default=2.5, help="size of the triangles of the first mesh, mm")
     options.add_argument("--adapted", type=int, default=4, help="largest number of meshes that are then adapted")
     args = options.parse_args()
     size, more, disc, share = (12.0, 0, 0.25, 0.1) if args.quick else (args.size, args.adapted, 0.05, 1.0)

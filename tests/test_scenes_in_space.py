@@ -61,6 +61,37 @@ def test_a_plug_that_meets_the_held_edge():
     assert any("after a travel of" in text and "cannot give way" in text for text in found), found
 
 
+def push_bar(tool):
+    """Push a tool into a clamped square, to a travel of 6; return the message and the findings at the start."""
+    scene = fx.Scene(mesh=fx.mesh.sheet(fx.mesh.rectangle(60.0, 60.0), size=15.0), thickness=1.0,
+                     supports=[fx.Clamped("rim")], materials=fx.NeoHookean(c10=1.0), model=fx.Membrane(wrinkles=0.01),
+                     contacts=[fx.Contact("top", tool, "stick", direction=(0, 0, -1), name="pin")])
+    warned = " ".join(found.text for found in fx.check(scene, targets=[fx.travel(6.0)]).findings)
+    try:
+        fx.trace(scene, until=fx.travel(6.0), progress=False)
+    except fx.ConvergenceError as error:
+        return str(error), warned
+    return "", warned
+
+
+def test_a_run_that_ends_at_the_held_edge_blames_the_edge():
+    """A bar lies across the sheet and both its held edges, which stop it."""
+    bar = fx.tools.extruded(fx.Tool([(-8.0, 30.0), (-8.0, 0.0), (8.0, 0.0), (8.0, 30.0)])).moved(z=0.5)
+    text, warned = push_bar(bar)
+    assert "meets the held edge of the sheet" in warned
+    assert "the sheet is held there and cannot give way: use a smaller tool" in text and "triangles" not in text
+
+
+def test_small_balls_are_pushed_and_told():
+    """A ball of a tenth of the sheet is no unit error, so the run begins; a hundredth is refused."""
+    ball = fx.tools.revolved(fx.tools.sphere(radius=3.0)).moved(z=0.5)
+    text, warned = push_bar(ball)
+    assert "the tool is 6 large, the sheet 60: are the units of length the same?" in warned
+    assert not text or "passes through the sheet" in text
+    with pytest.raises(fx.InputError, match="units of length"):
+        push_bar(fx.tools.revolved(fx.tools.sphere(radius=0.25)).moved(z=0.5))
+
+
 def test_files_whose_triangles_are_noisy_or_miss_their_edges(tmp_path):
     points, triangles = ball(16)
     smooth = Triangulated(points, triangles, "ball")

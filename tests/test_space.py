@@ -489,11 +489,15 @@ def on_ball(friction, pressure=0.02):
 
 
 def test_tray_without_friction():
-    """The tray is filled in less than 250 iterations, and walls do not depend on the number of nodes per step."""
+    """The tray is filled in less than 250 iterations, and walls do not depend on the number of nodes per step.
+
+    At the end all nodes touch. The last triangle then slides into the corner: its wall falls from .19 to .14 of the
+    thickness while the pressure rises by 2 %. Newton's method may diverge in one step that reaches over this.
+    """
     walls = []
     for share in (0.02, 0.06):
         path = fx.trace(tray("none", nodes_per_step=share), until=fx.pressure(1.2), progress=False)
-        assert path.counts.failures < 3 and path.counts.iterations < 250 and path.filling().touching[-1] > 0.99
+        assert path.counts.failures < 2 and path.counts.iterations < 250 and path.filling().touching[-1] > 0.99
         walls.append(path.wall().ratio)
     np.testing.assert_allclose(walls[1], walls[0], rtol=1e-7)
 

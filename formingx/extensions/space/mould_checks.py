@@ -14,6 +14,7 @@ from ...physics.supports import Symmetry
 from ...scene.contact_checks import OTHER_UNIT
 from .triangulated import Triangulated
 
+_SMALL_PUSHER = 9.0        # extent of the sheet over the extent of a tool that moves, from which on it is reported
 _INSIDE = 0.01             # distance of a held edge inside the mouth of a mould that is reported, over the width
 
 @register("start")
@@ -35,6 +36,20 @@ def sizes(body: Any) -> Iterator[Finding]:
                 "are the units of length the same (mm and cm)?"
             yield Finding("warning", repr(contact),
                           f"the tool is {wide / whole:.3g} times as wide as the sheet: {advice}")
+
+
+@register("start")
+def small_pushers(body: Any) -> Iterator[Finding]:
+    """Yield a finding for each tool that moves and is over 9 times smaller than the sheet, as in another unit."""
+    if body.scene.kinematics.components != 3:
+        return
+    whole = float(whole_extent(body.scene).max())
+    for contact in body.scene.contacts:
+        size = float(np.ptp(contact.tool.bounds, axis=0).max()) if contact.tool.sized else np.inf
+        if contact.direction is not None and size * _SMALL_PUSHER < whole:
+            yield Finding("warning", repr(contact), f"the tool is {size:.4g} large, the sheet {whole:.4g}: are the"
+                          f" units of length the same? If they are, use triangles smaller than the tool where it"
+                          f" touches")
 
 
 @register("scene")

@@ -23,6 +23,9 @@ _EXTENT_RATIO = 9.0
 The sheet may be a quarter of the whole.
 """
 
+_PUSHER_RATIO = 100.0
+"""The same ratio for a smaller tool that moves, such as a ball or a pin that is pushed into the sheet."""
+
 
 _SAME_SHARE = 1e-9
 """Largest difference between two shares of a layer in the thickness of a sheet that count as equal."""
@@ -208,7 +211,8 @@ def check_contact(scene: Any, contact: Any) -> None:
         raise InputError(f"{contact!r}: points = {contact.points!r}: in three dimensions contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
     whole = (2 if any(isinstance(support, Symmetry) for support in scene.supports) else 1) * length
-    if tool.sized and np.isfinite(size) and not 1 / _EXTENT_RATIO < whole / size < _EXTENT_RATIO:
+    most = _EXTENT_RATIO if contact.direction is None else _PUSHER_RATIO
+    if tool.sized and np.isfinite(size) and not 1 / _EXTENT_RATIO < whole / size < most:
         raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {whole:.4g}: are the units of length"
                          f" the same (mm, cm, inches)?")
     points = gathered(mesh.comm, mesh.domain.geometry.x)

@@ -55,6 +55,7 @@ class Depth(NamedTuple):
         place: deformed position of the point, shape (2,) or (3,), length.
         contact: the `FaceContact` with the tool.
         name: name of the `Contact` with the tool, or of its boundary if it has no name.
+        held: True for a point that supports constrain in all directions.
     """
 
     ratio: float
@@ -62,6 +63,7 @@ class Depth(NamedTuple):
     place: np.ndarray
     contact: Any
     name: str
+    held: bool = False
 
     @property
     def words(self) -> str:
@@ -130,7 +132,9 @@ class AdmissibilityCheck:
             yield "the two faces cross at the pole"
         if not self._solid:
             for deep in self._deepest_points(state, _allowed_penetration):
-                yield f"{deep.words}: the step was too long, or smaller triangles are needed there"
+                yield f"{deep.words}: " + (
+                    "the sheet is held there and cannot give way: use a smaller tool, a shorter travel or a wider sheet"
+                    if deep.held else "the step was too long, or smaller triangles are needed there")
             if self._problem.scene.kinematics.components == 3:
                 yield from self._problem.forms.self_penetration.reasons(state.x)
             return
@@ -202,10 +206,11 @@ class AdmissibilityCheck:
             for contact in problem.contact.faces:
                 x = contact.positions(state.x, state.control)
                 depth, place = contact.law.distance(x), x + contact.tool_displacement(state.control)
-                rows = gathered(contact.comm, np.column_stack([depth / allowed(contact), depth, place]))
+                held = np.isin(contact.rule.dofs, problem.constrained).all(1)
+                rows = gathered(contact.comm, np.column_stack([depth / allowed(contact), depth, held, place]))
                 k = int(np.argmax(rows[:, 0]))
                 if rows[k, 0] > 1:
-                    yield Depth(rows[k, 0], rows[k, 1], rows[k, 2:], contact, contact.contact.label)
+                    yield Depth(rows[k, 0], rows[k, 1], rows[k, 3:], contact, contact.contact.label, bool(rows[k, 2]))
 
     def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield for each tool the edge with the largest penetration over wall, if it exceeds the limit.
