@@ -17,6 +17,7 @@ from ...contact.face import FaceContact
 from ...contact.step_limit import LIMITS, Approach, StepRejection
 from ...physics.contact_law import ContactHistory
 from ...ranks import combined
+from ...values.tolerances import NEGLIGIBLE
 from .passed_tools import PassedPoint, PassedTool
 
 
@@ -60,6 +61,8 @@ class LaggedLimits:
 
 
 LAGGED = LaggedLimits()
+
+_SHORTENINGS = 50          # of a step until its predicted change of pressure is that of the limit
 
 
 class LaggedApproach(Approach):
@@ -259,14 +262,19 @@ class LaggedApproach(Approach):
         """Return the arc length, at most `length`, in which the pressure changes by `LaggedLimits.max_pressure_change`.
 
         start, velocity: positions relative to the tool and d/ds, shape (n, c), length. The pressure is extrapolated
-        linearly; without lagged friction the result is `length`.
+        linearly, down to 0, so its change grows less than in proportion to the length. Without lagged friction the
+        result is `length`.
         """
         if not self.has_lagged_friction:
             return length
         law, history = self.face.law, self.face.history
         rate = law.k * np.einsum("ni,ni->n", law.motion(start, history).normal, velocity)
-        change = self._pressure_difference(law.pressure(history) + length * rate)
-        return length * min(LAGGED.max_pressure_change / change, 1.0) if change else length
+        for _ in range(_SHORTENINGS):
+            change = self._pressure_difference(law.pressure(history) + length * rate)
+            if change <= (1 + NEGLIGIBLE) * LAGGED.max_pressure_change:
+                break
+            length *= LAGGED.max_pressure_change / change
+        return length
 
     def _pressure_difference(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
         """Return the relative difference of two pressures, shape (n,), stress, in the area-weighted 1-norm.
