@@ -61,6 +61,12 @@ def test_moulds_wider_or_narrower_than_the_sheet(moulds, kind, scale, words):
         assert re.search(words, finding.text), finding.text
 
 
+def test_a_narrow_file_may_be_in_another_unit(moulds):
+    """The outer side of a file's solid is wider than its cavity, and does not hide it."""
+    found = [finding.text for finding in fx.check(tray(12.0, moulds["file"])).findings]
+    assert any("is 0.197 times as wide as the sheet: is its file in another unit" in text for text in found), found
+
+
 @pytest.mark.thorough
 def test_a_sheet_is_blown_past_the_end_of_a_narrow_mould(moulds):
     """Below the pressure of the finding the overhang stays a shallow blister; above it, it is the thinnest place."""

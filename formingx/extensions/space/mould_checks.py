@@ -15,6 +15,7 @@ from ...scene.contact_checks import OTHER_UNIT
 from .triangulated import Triangulated
 
 _SMALL_PUSHER = 9.0        # extent of the sheet over the extent of a tool that moves, from which on it is reported
+_NEAR = 0.1                # of a point to the middle or the rim of a tool, over its largest distance from the middle
 _INSIDE = 0.01             # distance of a held edge inside the mouth of a mould that is reported, over the width
 
 @register("start")
@@ -136,5 +137,6 @@ def _distances_at_mouth(tool: Any, points: np.ndarray, ahead: float) -> np.ndarr
 def is_cavity(tool: Any, ahead: float) -> bool:
     """Return True if the middle of a tool is farther from the sheet than its rim; `ahead` is the z towards the tool."""
     points = tool.surface()[0]
-    away = np.hypot(*(points[:, :2] - points[:, :2].mean(0)).T)
-    return bool(ahead * (points[np.argmin(away), 2] - points[np.argmax(away), 2]) > 0)
+    away, depth = np.hypot(*(points[:, :2] - points[:, :2].mean(0)).T), ahead * points[:, 2]
+    middle, rim = away <= away.min() + _NEAR * np.ptp(away), away >= away.max() - _NEAR * np.ptp(away)
+    return bool(depth[middle].min() > depth[rim].min())     # on the side next to the sheet
