@@ -95,8 +95,8 @@ def plugs():
 
 def form(sheet, mould, share=1.0):
     """Return the path of plug and vacuum, or of a share of both, on the mesh of a quarter of the sheet."""
-    contacts = [fx.Contact("bottom", mould, FRICTION, nodes_per_step=3, name="mould"),
-                fx.Contact("top", plugs(), FRICTION, direction=(0, 0, -1), nodes_per_step=3, name="plug")]
+    contacts = [fx.Contact("bottom", mould, FRICTION, nodes_per_step=0.03, name="mould"),
+                fx.Contact("top", plugs(), FRICTION, direction=(0, 0, -1), nodes_per_step=0.03, name="plug")]
     scene = fx.Scene(mesh=sheet, thickness=THICKNESS, materials=MATERIAL, supports=HELD, contacts=contacts,
                      loads=[fx.Pressure("top", name="vacuum")], model=fx.Membrane(wrinkles=0.01))
     stages = [fx.Stage("plug", control="plug", until=fx.travel(share * PLUG_TRAVEL), speed=80.0),
