@@ -50,9 +50,7 @@ class SnapThrough:
         control_change: change of the control in a snap-through, at first.
         max_control_change: largest change of the control in a snap-through.
         first_viscosity: first value of eta.
-        min_viscosity: value of eta below which the snap-through has failed.
-        max_viscosity: largest eta before the body has begun to move.
-        max_viscosity_in_motion: largest eta after the body has begun to move.
+        max_viscosity: value of eta above which the snap-through has failed.
         max_easy_iterations: largest number of Newton iterations of a viscous solution after which eta decreases, at
             most by the inverse of `viscosity_growth`.
         viscosity_growth: factor of eta after a failed viscous solution, before the body has begun to move.
@@ -62,8 +60,6 @@ class SnapThrough:
         min_distance: smallest distance that the body should move in a viscous solution.
         max_distance: largest distance that the body should move in a viscous solution.
         distance_ratio: distance that the body should move in a viscous solution, over the distance moved so far.
-        repetition_ratio: distance moved in the first viscous solution, over the distance that the body should move,
-            above which the solution is repeated with more viscosity.
         max_solutions: number of viscous solutions after which the snap-through has failed. Where a sheet is drawn over
             an edge point by point, hundreds of solutions are needed.
         max_total_distance: distance moved after which the snap-through has failed.
@@ -78,9 +74,7 @@ class SnapThrough:
     control_change: float = 1e-6
     max_control_change: float = 1e-3
     first_viscosity: float = 1.0
-    min_viscosity: float = 1e-9
-    max_viscosity: float = 1e5
-    max_viscosity_in_motion: float = 1e9
+    max_viscosity: float = 1e9
     max_easy_iterations: int = 6
     viscosity_growth: float = 10.0
     viscosity_growth_in_motion: float = 3.0
@@ -88,7 +82,6 @@ class SnapThrough:
     min_distance: float = 3e-4
     max_distance: float = 0.1
     distance_ratio: float = 0.1
-    repetition_ratio: float = 3.0
     max_solutions: int = 1000
     max_iterations: int = 5000
     max_total_distance: float = 10.0
@@ -175,17 +168,14 @@ class _Motion:
 
     def continues(self, eta: float) -> bool:
         """Return True if the viscosity eta, over the shear modulus, and the distance moved so far are within bounds."""
-        settings = self._settings
-        most = settings.max_viscosity_in_motion if self.solved else settings.max_viscosity
         moved = self.curve.moved(self._old, self.state)
-        return settings.min_viscosity < eta < most and moved < settings.max_total_distance
+        return eta < self._settings.max_viscosity and moved < self._settings.max_total_distance
 
     def move(self, origin: Array, eta: float) -> float:
         """Solve F(x) + eta V (x - origin) = 0, and take the solution, shape (n,), as the new position unless rejected.
 
-        A failure, an inverted element, a point through a tool or work of the wrong sign reject it, and so does a too
-        large first motion. eta: viscosity over shear modulus. Return the factor of eta for the next solution: above 1
-        after a rejected solution.
+        A failure, an inverted element, a point through a tool or work of the wrong sign reject it. eta: viscosity over
+        shear modulus. Return the factor of eta for the next solution: above 1 after a rejected solution.
         """
         settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
@@ -205,8 +195,6 @@ class _Motion:
         most = np.clip(settings.distance_ratio * self.curve.moved(self._old, last), settings.min_distance,
                        settings.max_distance)
         far = self.curve.moved(replace(last, x=origin), new) / most
-        if not self.solved and far > settings.repetition_ratio:
-            return self._reject(far)
         before, self.unbalanced = self.unbalanced, relative(self.problem, np.sqrt(self._sum(pull * pull)))
         self.settles = self.unbalanced < min(self.trial_force, before)
         self._add_dissipation(origin, x, pull)                         # from the last or the predicted position
@@ -218,10 +206,10 @@ class _Motion:
         stays, self._wait = self._wait or len(history) - 1 > settings.max_easy_iterations, False
         return max(1.0 if stays else 1 / settings.viscosity_growth, far)
 
-    def _reject(self, grows: float = 0.0) -> float:
-        """Reject a solution, and return the factor by which eta grows; `grows` 0: that of the settings."""
+    def _reject(self) -> float:
+        """Reject a solution, and return the factor by which eta grows."""
         self._wait = True
-        return grows or (self._settings.viscosity_growth_in_motion if self.solved else self._settings.viscosity_growth)
+        return self._settings.viscosity_growth_in_motion if self.solved else self._settings.viscosity_growth
 
     def equilibrium(self) -> State | None:
         """Return the state of kind "jump" near the current position, without viscous forces; None if none is near.
