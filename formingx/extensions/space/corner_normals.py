@@ -19,6 +19,7 @@ import numpy as np
 from ...mesh.edges import edges_of
 from .patches import area_vectors, sides_of_edges, unit
 
+_REDUCTION = 0.95          # of a crease angle, over the largest turn of the edges at a normal that tilts too much
 _COPLANAR = 1e-4           # angle between triangles below which they are coplanar, radians
 _FILE_PRECISION = 2e-7     # error of coordinates in a file of 32-bit numbers, over the largest coordinate
 _ACROSS = 1e-2             # weight of a pair of vertices across an edge, over that of an edge
@@ -54,12 +55,21 @@ class Borders(NamedTuple):
 def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
     """Return unit normals of a smooth surface at the corners of triangles, shape (m, 3, 3).
 
-    crease: angle from which an edge is sharp, degrees; 0: flat triangles.
+    crease: angle from which an edge is sharp, degrees; 0: flat triangles. It is reduced until no normal tilts from that
+    of its triangle by more than this angle, as beside an edge that is just below it.
     """
-    if crease == 0:
-        return np.repeat(unit(area_vectors(points, triangles))[:, None], 3, axis=1)
-    groups = corner_groups(points, triangles, np.radians(crease))
-    return fitted_normals(points, triangles, groups, np.radians(crease))[groups]
+    facet, limit = unit(area_vectors(points, triangles))[:, None], np.radians(crease)
+    i, j = (side % len(triangles) for side in sides_of_edges(triangles))
+    turn = turns(facet[:, 0], i, j)
+    while limit > _COPLANAR:
+        groups = corner_groups(points, triangles, limit)
+        normals = fitted_normals(points, triangles, groups, limit)[groups]
+        tilted = np.linalg.norm(normals - facet, axis=2) > 2 * np.sin(np.radians(crease) / 2)
+        if not tilted.any():
+            return normals
+        near = np.isin(triangles, triangles[tilted]).any(1)   # triangles at a vertex with such a normal
+        limit = _REDUCTION * turn[(near[i] | near[j]) & (turn < limit)].max(initial=0.0)
+    return np.repeat(facet, 3, axis=1)
 
 
 def misfit(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> tuple[float, np.ndarray]:
