@@ -24,6 +24,9 @@ Predictor: TypeAlias = Callable[[float], Array | None]
 Bend: TypeAlias = tuple[Array, float]
 """Correction of a guess on the tangent: (change of x, locally owned entries; change of the control)."""
 
+_LIMIT_POINT_ITERATIONS = 16
+"""Largest number of states that are solved for to find a limit point."""
+
 _FLAT = 1e-8
 """Mean displacement over the size of the body below which a body without stiffness is in the reference configuration.
 """
@@ -343,17 +346,23 @@ class Curve:
     def limit_point(self, a: State, b: State) -> State:
         """Return the state of kind "limit point" between two states at which the control is stationary.
 
-        The Hermite cubic gives the guess, and each state found replaces an end. This is repeated until the control is
-        within 1e-12 of its extremum, relative, as estimated from slope and curvature.
+        The Hermite cubic gives the guess, and each state found replaces an end. If its slope is more than half of the
+        slope of that end, the path is curved too much for the cubic: the next guess is the middle. This is repeated
+        until the control is within 1e-12 of its extremum, relative, as estimated from slope and curvature. Raise
+        `Failure` if the slope stays above 1e-3 of the first ones.
         """
-        for _ in range(8):
+        halve, first = False, max(abs(a.slope), abs(b.slope))
+        for _ in range(_LIMIT_POINT_ITERATIONS):
             chord = self.distance(a, b)
-            x, control = self.interpolate(a, b, _stationary(a, b, chord))
+            x, control = self.interpolate(a, b, 0.5 if halve else _stationary(a, b, chord))
             found = self.solve(x, control, self._plane(a, x, control), "limit point", a)
             curvature = abs(a.slope - b.slope) / chord
             if found.slope**2 < 2e-12 * curvature * abs(found.control):
                 break
-            a, b = (found, b) if found.slope * a.slope > 0 else (a, found)
+            old, a, b = (a, found, b) if found.slope * a.slope > 0 else (b, a, found)
+            halve = abs(found.slope) > abs(old.slope) / 2
+        if abs(found.slope) > 1e-3 * first:
+            raise Failure("the control is not stationary", [])
         return found
 
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
