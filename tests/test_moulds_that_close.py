@@ -8,6 +8,9 @@ from test_tubes import CAPPED, SYMMETRIES, scene
 
 import formingx as fx
 from formingx.extensions.space.surface_mesh import below
+from formingx.extensions.space.tool_checks import stopped_at_a_ridge
+from formingx.mesh.triangles import place
+from formingx.solve.diagnose import FailedRun
 
 BODY = fx.tools.swept(fx.Tool([(0, -16), (10, -16), (35, -46), (35, -180), (0, -180)], [0, 0, 12, 6, 0]),
                       half=(35.0, 35.0), corner=12.0)
@@ -279,6 +282,17 @@ def test_a_sharp_ridge_is_named_before_a_sheet_slides():
     assert ends[:, 0] - 2 == pytest.approx(ends[:, 1]) and 12 < ends[0, 1] < 14 and 21.5 < ends[1, 1] < 23
     assert ends[:, 2] == pytest.approx(-16 - 1.2 * (ends[:, 1] - 10), abs=0.02)             # of the profile
     assert not [f for f in fx.check(scenes["stick"]).findings if "ridge" in f.text]
+
+
+@pytest.mark.parametrize("friction, z, told", [(0.3, -18.0, True), (0.3, -120.0, False), ("stick", -18.0, False)])
+def test_a_failed_run_names_a_sharp_ridge(friction, z, told):
+    """The node with the largest out-of-balance force is on the diagonal, below the neck or far below it."""
+    mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(24, 4), part="quarter", end="closed")
+    bottle, stages = blown(mesh, [fx.Clamped("neck")], friction=friction, volume=500.0)
+    path = fx.Process(bottle).run(stages[:1], progress=False)
+    x = 16 / np.sqrt(2)
+    found = list(stopped_at_a_ridge(FailedRun({"worst": place(mesh, (x, x, z))}, path.problem, path.last)))
+    assert len(found) == told and all("corner = 21.67" in finding.advice for finding in found)
 
 
 def test_small_fillets_where_parts_meet_are_named_before_a_sheet_slides():

@@ -1,10 +1,12 @@
 """Checks of what the triangles of a tool's file, and of a sheet, cannot resolve."""
 
 from collections.abc import Iterator
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
+from ...contact.tooling import Tooling
 from ...findings import Finding, percent, register
 from ...ranks import gathered
 from ...tools.pieces import Arc
@@ -14,9 +16,11 @@ from .passed_tools import surface_points
 from .solid_tool import Swept
 from .triangulated import Triangulated
 from .union import Union
+from .wall import wall_of
 
 _FILLET_SHARE = 2e-3       # of the points of a tool over the sheet, from which on a concave fillet is reported
 _RIDGE, _RIDGE_POINTS = 0.02, 41                            # smallest relative size of a ridge; points on a piece
+_NEAR_RIDGE = 3.0          # distance of a node from a ridge, over its longest edge, within which the ridge counts
 _ON_SURFACE = 5e-3         # of a point from the tool, over its size
 _COARSE_WALL = 0.02        # error of the volume of a sheet by its triangles that is reported
 
@@ -125,18 +129,43 @@ def sharp_ridges(body: Any) -> Iterator[Finding]:
     The sides meet sharply where the profile is narrower than the corners: the normal of the tool jumps there.
     """
     for contact in body.scene.contacts:
-        if contact.lagged and not contact.sticks:
-            for part in _parts(contact.tool):
-                if not isinstance(part, Swept) or part.kind != "box":
-                    continue
-                places = ridge(part, contact.tool)
-                if len(places):
-                    ends = " to ".join(f"({', '.join(f'{v:.4g}' for v in place)})" for place in places[[0, -1]])
-                    yield Finding("serious", repr(contact), f"its sides meet at a sharp ridge from (x, y, z) = {ends}."
-                                  f" A sheet that slides stops where a node meets it. Round it: corner ="
-                                  f" {min(part.half) - _inner_radius(places, part):.4g} or more, or take the union of"
-                                  f" two extruded profiles, fx.tools.union(a, b, fillet=...), with a fillet above the"
-                                  f" size of the triangles")
+        for _, places, advice in _ridges(contact):
+            ends = " to ".join(f"({', '.join(f'{v:.4g}' for v in place)})" for place in places[[0, -1]])
+            yield Finding("serious", repr(contact), f"its sides meet at a sharp ridge from (x, y, z) = {ends}. A sheet"
+                          f" that slides stops where a node meets it. Round it: {advice}")
+
+
+@register("failure")
+def stopped_at_a_ridge(failure: Any) -> Iterator[Finding]:
+    """Yield a finding if the largest out-of-balance force is within three triangles of a sharp ridge; collective."""
+    problem, last, worst = failure.problem, failure.last, failure.facts.get("worst")
+    if last is None or worst is None or problem.scene.kinematics.components != 3:
+        return
+    tooling, wall = Tooling.of_problem(problem), None
+    for contact, travel in zip(tooling.contacts, tooling.travels(last.setting, last.control), strict=True):
+        for part, places, advice in () if travel is None else _ridges(contact):
+            wall = wall or wall_of(SimpleNamespace(problem=problem), last)
+            node = int(np.argmin(np.linalg.norm(wall.reference_points - worst.position, axis=1)))
+            corners = wall.deformed_points[wall.triangles[(wall.triangles == node).any(1)]]
+            position = wall.deformed_points[node]
+            relative, on_ridge = position - (travel or 0.0) * contact.travel_vector - part.shift, places - part.shift
+            away = relative - on_ridge
+            away[:, :2] = np.abs(relative[:2]) - np.abs(on_ridge[:, :2])                   # of the four ridges
+            distance = float(np.linalg.norm(away, axis=1).min())
+            if distance < _NEAR_RIDGE * np.linalg.norm(corners - position, axis=2).max():
+                yield Finding("serious", "contact", f"the sheet slides near a sharp ridge of the tool"
+                              f" {contact.label!r}: the largest out-of-balance force is {distance:.2g} away from it, at"
+                              f" {worst}. The normal jumps on the ridge, and in fillets which it meets",
+                              f"a rounded ridge: {advice}")
+
+
+def _ridges(contact: Any) -> Iterator[tuple[Swept, np.ndarray, str]]:
+    """Yield each part with a sharp ridge of a tool on which a sheet slides, its points, (k, 3), length, and advice."""
+    for part in _parts(contact.tool) if contact.lagged and not contact.sticks else ():
+        if isinstance(part, Swept) and part.kind == "box" and len(places := ridge(part, contact.tool)):
+            yield part, places, (f"corner = {min(part.half) - _inner_radius(places, part):.4g} or more, or take the"
+                                 f" union of two extruded profiles, fx.tools.union(a, b, fillet=...), with a fillet"
+                                 f" above the size of the triangles")
 
 
 def ridge(part: Swept, tool: Any) -> np.ndarray:
