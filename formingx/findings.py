@@ -47,6 +47,11 @@ def percent(share: float) -> str:
     return f"{float(f'{100 * share:.2g}'):g} %"
 
 
+def coordinates(point: Iterable[float], digits: int = 4) -> str:
+    """Return a position as text, such as "(1.5, 0.25)", with a number of digits for each coordinate."""
+    return f"({', '.join(f'{x:.{digits}g}' for x in point)})"
+
+
 class Check(Protocol[Subject]):
     """Interface of a check: a function of its subject.
 

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ..findings import Finding, percent, register
+from ..findings import Finding, coordinates, percent, register
 from ..mesh.nodes import SAME_PLACE
 from ..physics.models import DisplacementPenalty
 from ..physics.supports import NAMES, PrescribedDisplacement, SimplySupported, Symmetry
@@ -74,7 +74,7 @@ def _hinged_edges(body: SizedBody) -> Iterator[Finding]:
             corner = a.ends[1]
             turns = abs(np.sin(b.angles[0] - a.angles[1])) > ROUND_OFF
             if turns and (np.linalg.norm(nodes - corner, axis=1) < ROUND_OFF * body.length).any():
-                yield Finding("warning", repr(contact), f"its sharp edge at (R, Z) = ({corner[0]:.4g}, {corner[1]:.4g})"
+                yield Finding("warning", repr(contact), f"its sharp edge at (R, Z) = {coordinates(corner)}"
                               f" touches the edge of a hinged face: round-off decides whether both stick together,"
                               f" which changed walls by 0.4 %. Give the tool a lip, move it by a millionth of the"
                               f" thickness, or use Clamped")

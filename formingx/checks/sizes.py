@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..errors import InputError
-from ..findings import Finding, register
+from ..findings import Finding, coordinates, register
 from ..materials.inflation import FreeInflation, Peak, first_peak
 from ..measures.targets import Target
 from ..mesh.triangles import Triangles
@@ -391,7 +391,7 @@ def _sharp_edges(body: SizedBody) -> Found:
             turn = np.degrees((b.angles[0] - a.angles[1] + np.pi) % (2 * np.pi) - np.pi)
             if turn > _CORNER_ANGLE:                             # the solid is to the left: convex
                 yield Finding("warning", repr(contact),
-                              f"its edge at (R, Z) = ({a.ends[1][0]:.4g}, {a.ends[1][1]:.4g}) is sharp: forces"
+                              f"its edge at (R, Z) = {coordinates(a.ends[1])} is sharp: forces"
                               f" there are off by 1 to 3 %, depending on where nodes lie, and more elements"
                               f" through the thickness ({rows:.2g} here) do not help: give it a fillet that"
                               f" spans some elements along the sheet")

@@ -10,6 +10,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
+from ..findings import coordinates
 from ..mesh.locate import locate
 from ..mesh.nodes import cell_node_positions, own_cells
 from ..ranks import gathered
@@ -194,10 +195,9 @@ class MidSurfaceProbe(Probe):
         middle = self._problem.forms.nearest(self.points)
         outside = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
         if np.any(outside):
-            r, z = self.points[np.argmax(outside)]
-            raise InputError(f"point (R, Z) = ({r:.6g}, {z:.6g}) is not on the mid-surface, and a membrane knows no"
-                             f" other: there it is ({middle[np.argmax(outside)][0]:.6g},"
-                             f" {middle[np.argmax(outside)][1]:.6g})")
+            point, nearest = (coordinates(x[np.argmax(outside)], 6) for x in (self.points, middle))
+            raise InputError(f"point (R, Z) = {point} is not on the mid-surface, and a membrane knows no other: there"
+                             f" it is {nearest}")
         return super().row(factors)
 
     def _local(self, values: np.ndarray) -> np.ndarray:

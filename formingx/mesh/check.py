@@ -6,6 +6,7 @@ import numpy as np
 
 from .._jit import CFunctions
 from ..errors import InputError
+from ..findings import coordinates
 from ..values.tolerances import FAR, ROUND_OFF
 from .boxes import overlapping
 from .edges import edges_of
@@ -148,4 +149,4 @@ def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:
 
 def show(point: np.ndarray) -> str:
     """Return a point, shape (2 or 3,), as text for messages."""
-    return f"{'(R, Z)' if len(point) == 2 else '(x, y, z)'} = ({', '.join(f'{v:.6g}' for v in point)})"
+    return f"{'(R, Z)' if len(point) == 2 else '(x, y, z)'} = {coordinates(point, 6)}"

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
+from ..findings import coordinates
 from .check import check_elements
 from .check_surface import check_surface
 from .mesh import Mesh
@@ -179,6 +180,6 @@ def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], c
     found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in pairs if (min(a, b), max(a, b)) in known]
     if found and len(found) < len(edges):
         bad = next(pair for pair in pairs if (min(pair), max(pair)) not in known)
-        position = [f"({', '.join(f'{v:.6g}' for v in points[n])})" if n >= 0 else "a node of no element" for n in bad]
+        position = [coordinates(points[n], 6) if n >= 0 else "a node of no element" for n in bad]
         raise InputError(f"{caller}: its edge from {position[0]} to {position[1]} is not an edge of an element")
     return found

@@ -8,6 +8,7 @@ from mpi4py import MPI
 
 from .. import _compat
 from ..errors import InputError
+from ..findings import coordinates
 from ..values.tolerances import NEGLIGIBLE
 from .nodes import axes, own_cells
 
@@ -59,8 +60,8 @@ def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None 
     best = np.empty_like(depth)
     comm.Allreduce(np.where(found >= 0, depth, -np.inf), best, MPI.MAX)
     if np.any(best == -np.inf):
-        at = ", ".join(f"{v:.6g}" for v in points[np.argmax(best == -np.inf)])
-        raise InputError(f"point ({', '.join(axes(mesh)[:points.shape[1]])}) = ({at}) is not in the {within}")
+        at = coordinates(points[np.argmax(best == -np.inf)], 6)
+        raise InputError(f"point ({', '.join(axes(mesh)[:points.shape[1]])}) = {at} is not in the {within}")
     ranks = np.where((found >= 0) & (depth == best), comm.rank, comm.size)
     owner = np.empty_like(ranks)
     comm.Allreduce(ranks, owner, MPI.MIN)

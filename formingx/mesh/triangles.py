@@ -4,6 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..findings import coordinates
 from ..ranks import gathered
 from .mesh import Mesh
 from .nodes import cell_node_positions, own_cells
@@ -37,7 +38,7 @@ class Place(NamedTuple):
     def __str__(self) -> str:
         layer = f" in layer {self.layer!r}" if self.layer else ""
         axes = "(R, Z)" if len(self.position) == 2 else "(x, y, z)"
-        where = f"{axes} = ({', '.join(f'{v:.6g}' for v in self.position)}){layer}"
+        where = f"{axes} = {coordinates(self.position, 6)}{layer}"
         if not self.boundary:
             return where
         side = f", {self.distance:.3g} from boundary {self.boundary!r}" if self.distance else f", on {self.boundary!r}"

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..findings import coordinates
 from ..mesh.nodes import node_positions
 from ..physics.contact import Contact
 from ..physics.supports import Constrained
@@ -48,7 +49,7 @@ def check_start(scene: Any, contact: Contact) -> None:
             why = (f"; the tool is {size:.4g} large, the body {length:.4g}: are the units of length the same (mm"
                    f" and cm)?")
         raise InputError(f"{contact!r}: the body starts inside the tool: {depth[worst]:.6g} deep at (R, Z) ="
-                         f" ({points[worst, 0]:.6g}, {points[worst, 1]:.6g}){why}")
+                         f" {coordinates(points[worst], 6)}{why}")
     if depth[worst] > contact.tool.signed_distance(face).max() + near:
         raise InputError(f"{contact!r}: the tool is behind this face of the body: another face is closer to it;"
                          f" boundaries are {list(mesh.boundaries)}")

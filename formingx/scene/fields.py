@@ -9,6 +9,7 @@ from dolfinx import fem
 from mpi4py import MPI
 
 from ..errors import InputError, finite, values
+from ..findings import coordinates
 from ..io import csv_files
 from ..mesh import Mesh
 from ..mesh.locate import locate
@@ -131,4 +132,4 @@ def _check_inside(name: str, points: np.ndarray, axes: str, inside: np.ndarray) 
 
 def _first_false(points: np.ndarray, mask: np.ndarray, axes: str) -> str:
     """Return the coordinates of the first of points (n, 2) with False in the mask (n,), as text."""
-    return f"({', '.join(axes)}) = ({', '.join(f'{v:.6g}' for v in points[np.argmin(mask)])})"
+    return f"({', '.join(axes)}) = {coordinates(points[np.argmin(mask)], 6)}"

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
+from ..findings import coordinates
 from ..mesh.nodes import facet_node_positions
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
@@ -78,6 +79,6 @@ def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> 
         edge = float(np.hypot(*(ends[worst, 1] - ends[worst, 0])))
         r, z = ends[worst].mean(0)
         raise InputError(f"{contact!r}: the tool would be {depth[worst]:.4g} deep in {contact.on!r} near (R, Z) ="
-                         f" ({r:.4g}, {z:.4g}), between two contact points, before it meets one: use elements of"
+                         f" {coordinates((r, z))}, between two contact points, before it meets one: use elements of"
                          f" {edge * CUT * thickness / depth[worst]:.4g} or less there (they are {edge:.4g} long), or a"
                          f" rounder edge")

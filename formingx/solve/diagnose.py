@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import ConvergenceError, InputError
-from ..findings import Finding, findings_at, register
+from ..findings import Finding, coordinates, findings_at, register
 from ..mesh.triangles import Place
 from .arc_length import Curve
 from .branches import branches, determinant_sign
@@ -285,7 +285,7 @@ def _element_findings(run: FailedRun) -> Iterator[Finding]:
         yield Finding("serious", "element",
                       f"an element is about to turn inside out: {now} in the last good state, at {facts['at_J']}"
                       + (f" (in the failed attempt J = {failed_J:.3g})" if inverted else ""),
-                      f"smaller elements around (R, Z) = ({R:.4g}, {Z:.4g}), in a disc with"
+                      f"smaller elements around (R, Z) = {coordinates((R, Z))}, in a disc with"
                       f" concentrate={{{R:.4g}: 0.2}}, or elements that are long at the start in the direction in which"
                       f" they are compressed there")
 
@@ -296,9 +296,9 @@ def _buckling_findings(run: FailedRun) -> Iterator[Finding]:
     if _buckles(run.facts):
         stretch, first, last = run.facts["shortened"]
         yield Finding("serious", "wall",
-                      f"the wall buckles: between (R, Z) = ({first[0]:.4g}, {first[1]:.4g}) and ({last[0]:.4g},"
-                      f" {last[1]:.4g}) it is compressed along its section, to {stretch:.3g} of its length, as supports"
-                      f" and tools hold both its ends",
+                      f"the wall buckles: between (R, Z) = {coordinates(first)} and {coordinates(last)} it is"
+                      f" compressed along its section, to {stretch:.3g} of its length, as supports and tools hold both"
+                      f" its ends",
                       "more room for the free end of the body: where it comes to stand on its tool early, as a"
                       " parison's bottom on the base of its mould, the blown part presses on the wall above; or a"
                       " support that lets the other end move")

@@ -169,6 +169,7 @@ class LocalContact:
 
     Attributes:
         max_points: largest number of points in a local solve; with more points Newton's method continues without it.
+            The prediction of contact events solves for at most as many sliding points.
         max_changes: number of changed points up to which Woodbury's formula costs less than another factorisation.
         max_iterations: largest number of iterations of the local solve.
         full_corrections: number of full corrections at the start, which may cycle. In later corrections sticking points
@@ -182,7 +183,7 @@ class LocalContact:
         accuracy: tolerance of the motions of the points, over the half-width of the ramp.
     """
 
-    max_points: int = 40
+    max_points: int = 80
     max_changes: int = 3
     max_iterations: int = 40
     full_corrections: int = 8
@@ -193,7 +194,7 @@ class LocalContact:
     accuracy: float = 1e-4
 
 
-_LOCAL = LocalContact()
+LOCAL = LocalContact()
 
 
 class LocalSolve:
@@ -232,7 +233,7 @@ class LocalSolve:
         for _ in range(4):
             chosen = [np.flatnonzero(mark) for mark in self._marked]
             points = combined(self._problem.comm, sum(map(len, chosen)), MPI.SUM)
-            if not 0 < points <= _LOCAL.max_points:
+            if not 0 < points <= LOCAL.max_points:
                 return step
             small = _Points(self._problem, chosen, solver, border)
             change = small.solve(dx, step)
@@ -273,7 +274,7 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
     """
     chosen = [np.flatnonzero(change.any((1, 2))) for change in changes]
     points = combined(problem.comm, sum(map(len, chosen)), MPI.SUM)
-    if points > _LOCAL.max_changes:
+    if points > LOCAL.max_changes:
         return None
     if not points:
         return lambda V, step: V
@@ -319,10 +320,10 @@ class _Points:
         y0 = self._gather(self._moved(dx.array_r, step))
         f0, S0 = self._forces([c.increment.last_tractions(i) for c, i in self._some])
         laws, ramps = [c.increment.law_at(i) for c, i in self._some], list[Any]()
-        y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, _LOCAL.entry_depth)
+        y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
-        accuracy = _LOCAL.accuracy * min([c.law.theta for c in self._contacts])
-        for k in range(_LOCAL.max_iterations):
+        accuracy = LOCAL.accuracy * min([c.law.theta for c in self._contacts])
+        for k in range(LOCAL.max_iterations):
             f, S = self._forces([(found.force, found.stiffness) for found in self._at_faces(laws, y)])
             added = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
             with np.errstate(over="ignore", invalid="ignore"):
@@ -340,10 +341,10 @@ class _Points:
             if correction is None:
                 return None
             new = y - correction
-            if k >= _LOCAL.full_corrections:
+            if k >= LOCAL.full_corrections:
                 ramps = ramps or [c.increment.in_ramp(i) for c, i in self._some]
                 new, keep = self._stop_at_edge(ramps, y, new, entry_depth)
-                halvings = 0 if keep else _LOCAL.max_halvings
+                halvings = 0 if keep else LOCAL.max_halvings
             y, dy = new, new - y
         return None
 
@@ -355,10 +356,10 @@ class _Points:
         must not be halved: a point was stopped, or all points stick.
         """
         (before, _), (depth, path) = (self._gather_pairs(self._at_faces(ramps, z), (), (self._c,)) for z in (y, new))
-        leaves, enters = (before > _LOCAL.min_depth) & (depth <= 0), (before <= 0) & (depth > 0)
-        stopped = np.where(leaves, _LOCAL.kept_depth * np.minimum(before, 1.0),
+        leaves, enters = (before > LOCAL.min_depth) & (depth <= 0), (before <= 0) & (depth > 0)
+        stopped = np.where(leaves, LOCAL.kept_depth * np.minimum(before, 1.0),
                            np.where(enters, np.minimum(depth, entry_depth), depth))
-        entry_depth[enters] /= _LOCAL.kept_depth
+        entry_depth[enters] /= LOCAL.kept_depth
         back = (stopped - depth)[:, None] * path
         return new + back.ravel(), bool(back.any() or path.any(axis=1).all())
 

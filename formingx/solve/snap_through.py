@@ -60,6 +60,8 @@ class SnapThrough:
         min_distance: smallest distance that the body should move in a viscous solution.
         max_distance: largest distance that the body should move in a viscous solution.
         distance_ratio: distance that the body should move in a viscous solution, over the distance moved so far.
+        repetition_ratio: distance moved in the first viscous solution, over the distance that the body should move,
+            above which the solution is repeated with more viscosity.
         max_solutions: number of viscous solutions after which the snap-through has failed. Where a sheet is drawn over
             an edge point by point, hundreds of solutions are needed.
         max_total_distance: distance moved after which the snap-through has failed.
@@ -82,6 +84,7 @@ class SnapThrough:
     min_distance: float = 3e-4
     max_distance: float = 0.1
     distance_ratio: float = 0.1
+    repetition_ratio: float = 3.0
     max_solutions: int = 1000
     max_iterations: int = 5000
     max_total_distance: float = 10.0
@@ -174,8 +177,9 @@ class _Motion:
     def move(self, origin: Array, eta: float) -> float:
         """Solve F(x) + eta V (x - origin) = 0, and take the solution, shape (n,), as the new position unless rejected.
 
-        A failure, an inverted element, a point through a tool or work of the wrong sign reject it. eta: viscosity over
-        shear modulus. Return the factor of eta for the next solution: above 1 after a rejected solution.
+        A failure, an inverted element, a point through a tool or work of the wrong sign reject it, and so does a too
+        large first motion. eta: viscosity over shear modulus. Return the factor of eta for the next solution: above 1
+        after a rejected solution.
         """
         settings, self._drag.eta, self._drag.origin = self._settings, eta, origin
         self._x.array_w[:] = origin
@@ -195,6 +199,9 @@ class _Motion:
         most = np.clip(settings.distance_ratio * self.curve.moved(self._old, last), settings.min_distance,
                        settings.max_distance)
         far = self.curve.moved(replace(last, x=origin), new) / most
+        if not self.solved and far > settings.repetition_ratio:
+            self._wait = True
+            return far
         before, self.unbalanced = self.unbalanced, relative(self.problem, np.sqrt(self._sum(pull * pull)))
         self.settles = self.unbalanced < min(self.trial_force, before)
         self._add_dissipation(origin, x, pull)                         # from the last or the predicted position

@@ -6,6 +6,7 @@ from collections.abc import Callable
 import numpy as np
 
 from ..errors import InputError
+from ..findings import coordinates
 from ..values.tolerances import CURVE_POINTS
 from .pieces import Arc, Line
 
@@ -30,7 +31,7 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
         points, derivatives = curve(np.linspace(low, high, 17))
         lengths = np.hypot(*derivatives.T)
         if not np.all(np.isfinite(points)) or not lengths[[0, -1]].min() > 0:
-            raise InputError(f"{name}: it has a corner or no direction near ({points[0, 0]:.6g}, {points[0, 1]:.6g})")
+            raise InputError(f"{name}: it has a corner or no direction near {coordinates(points[0], 6)}")
         found = _biarc(points[0], derivatives[0] / lengths[0], points[-1], derivatives[-1] / lengths[-1])
         if found and np.min([_distance_to(points, piece) for piece in found], axis=0).max() <= tolerance:
             made += len(found)
@@ -53,7 +54,7 @@ def in_plane(points: np.ndarray, name: str) -> np.ndarray:
     outside = ~(np.abs(points[:, 2]) <= 1e-9 * max(np.abs(points[:, :2]).max(initial=0.0), 1e-300))
     if np.any(outside):
         x, y, z = points[np.argmax(outside)]
-        raise InputError(f"{name} has the point ({x:.6g}, {y:.6g}, {z:.6g}): z must be 0: a profile is drawn in the"
+        raise InputError(f"{name} has the point {coordinates((x, y, z), 6)}: z must be 0: a profile is drawn in the"
                          f" x-y plane, x for R and y for Z")
     return points[:, :2]
 

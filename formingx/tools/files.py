@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, as_list, check_name, count, file_path, finite, pair, positive
+from ..findings import coordinates
 from ..mesh import msh
 from ..units import LENGTHS, Units
 from . import cad, dxf, geo
@@ -131,8 +132,8 @@ def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | 
         neighbours[b].append(a)
     number = np.array([1 + len(others) for others in neighbours])
     if number.max() > 2 or len(curves) > 1 and any(k ^ 1 in others for k, others in enumerate(neighbours)):
-        x, y = ends[np.argmax(number)]
-        raise InputError(f"tool file {file!r}: more than two ends of curves meet near ({x:.6g}, {y:.6g}), or a curve"
+        place = coordinates(ends[np.argmax(number)], 6)
+        raise InputError(f"tool file {file!r}: more than two ends of curves meet near {place}, or a curve"
                          f" closes in itself: name the curves of the profile, curves=[...]")
     free = np.flatnonzero(number == 1)
     if len(free) not in (0, 2):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..errors import InputError, finite, pair, positive
+from ..findings import coordinates
 from ..values.tolerances import ROUND_OFF
 
 TURN = 2 * math.pi
@@ -90,7 +91,7 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
     lengths = {e: math.dist(points[e[0]], points[e[1]]) for e in edges}
     for (i, j), length in lengths.items():
         if length <= ROUND_OFF * size:
-            raise InputError(f"Tool: points {i} and {j} are the same, {text(points[i])}")
+            raise InputError(f"Tool: points {i} and {j} are the same, {coordinates(points[i], 6)}")
     angle = {e: math.atan2(*(points[e[1]] - points[e[0]])[::-1]) for e in edges}
     before = {j: (i, j) for i, j in edges}
     after = {i: (i, j) for i, j in edges}
@@ -136,7 +137,7 @@ def with_polyline(pieces: tuple[Line | Arc, ...], points: np.ndarray, radii: lis
         points, radii, first, last = points[::-1], radii[::-1], last, first
     (i, u), (j, v) = first[0], last[-1]
     if math.dist(points[0], points[-1]) <= ROUND_OFF * size:
-        raise InputError(f"Tool.with_piece: the first and the last point are the same, {text(points[0])}")
+        raise InputError(f"Tool.with_piece: the first and the last point are the same, {coordinates(points[0], 6)}")
     corners, begin, end = list(points), pieces[i].ends[0], pieces[j].ends[1]
     if u > -math.inf and math.dist(begin, points[0]) > _ON_PROFILE * size:
         corners, radii = [begin, *corners], [0.0, *radii]
@@ -167,8 +168,8 @@ def _places(pieces: tuple[Line | Arc, ...], point: np.ndarray, size: float) -> l
                 found.append((k, along))
     if not found:
         near = min(nearest, key=lambda entry: entry[0], default=None)
-        raise InputError(f"Tool.with_piece: the point {text(point)} is on no line of the profile"
-                         + (f": the nearest one is {text(near[1])}" if near else ", which has arcs alone"))
+        raise InputError(f"Tool.with_piece: the point {coordinates(point, 6)} is on no line of the profile"
+                         + (f": the nearest one is {coordinates(near[1], 6)}" if near else ", which has arcs alone"))
     return found
 
 
@@ -194,8 +195,9 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
     for (i, j), length in lengths.items():
         if cut[i] + cut[j] > length * (1 + ROUND_OFF):
             k = i if cut[i] >= cut[j] else j
-            raise InputError(f"Tool: fillet at point {k} = {radii[k]:g} is too large for its corner {text(points[k])}:"
-                             f" the edge from {text(points[i])} to {text(points[j])} is {length:.6g} long and its"
+            corner, a, b = (coordinates(points[n], 6) for n in (k, i, j))
+            raise InputError(f"Tool: fillet at point {k} = {radii[k]:g} is too large for its corner {corner}:"
+                             f" the edge from {a} to {b} is {length:.6g} long and its"
                              f" fillets take {cut[i] + cut[j]:.6g}; at most"
                              f" {radii[k] * max(length - cut[i] - cut[j] + cut[k], 0) / cut[k]:.6g} fits")
 
@@ -209,7 +211,7 @@ def checked(piece: Line | Arc, i: int) -> Line | Arc:
     if isinstance(piece, Line):
         a, b = (np.array(pair(f"{caller}: an end", p)) for p in piece)
         if not math.dist(a, b) > 1e-12 * max(np.abs(a).max(), np.abs(b).max()):
-            raise InputError(f"{caller}: a line from {text(a)} to {text(b)} has no length")
+            raise InputError(f"{caller}: a line from {coordinates(a, 6)} to {coordinates(b, 6)} has no length")
         return Line(a, b)
     if not isinstance(piece, Arc):
         raise InputError(f"{caller} = {piece!r}: must be a Line or an Arc")
@@ -237,8 +239,3 @@ def sampled(piece: Line | Arc, n: int) -> np.ndarray:
 def number_of_chords(piece: Line | Arc) -> int:
     """Return the number of chords that replace a piece in the search for crossings: 64 per 90 degrees, at least 4."""
     return 1 if isinstance(piece, Line) else max(4, math.ceil(256 * abs(piece.sweep) / TURN))
-
-
-def text(point: np.ndarray) -> str:
-    """Return a point, shape (2,), as text for messages."""
-    return f"({point[0]:.6g}, {point[1]:.6g})"

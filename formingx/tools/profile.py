@@ -14,6 +14,7 @@ import numpy as np
 
 from .._jit import CFunctions
 from ..errors import InputError, as_list, as_points, check_type, finite, non_negative, pair
+from ..findings import coordinates
 from ..mesh.boxes import overlapping
 from ..values.tolerances import ROUND_OFF
 from .pieces import (
@@ -24,7 +25,6 @@ from .pieces import (
     number_of_chords,
     rounded,
     sampled,
-    text,
     turn_angle,
     with_polyline,
 )
@@ -134,10 +134,10 @@ class Tool:
                                                               default=0.0)))
         for i, (p, q) in enumerate(zip(pieces, pieces[1:] + (pieces[:1] if closed else []))):
             if math.dist(p.ends[1], q.ends[0]) > 1e-6 * self.size:
-                raise InputError(f"Tool: piece {i} ends at {text(p.ends[1])}, the next begins at {text(q.ends[0])}:"
-                                 f" the pieces of a profile must follow one another")
+                raise InputError(f"Tool: piece {i} ends at {coordinates(p.ends[1], 6)}, the next begins at"
+                                 f" {coordinates(q.ends[0], 6)}: the pieces of a profile must follow one another")
             if math.pi - abs(turn_angle(p.angles[1], q.angles[0])) < 1e-6:
-                raise InputError(f"Tool: the profile doubles back at (R, Z) = {text(p.ends[1])}")
+                raise InputError(f"Tool: the profile doubles back at (R, Z) = {coordinates(p.ends[1], 6)}")
         self._check_crossing()
         self._tabulate()
 
@@ -266,8 +266,8 @@ class Tool:
         numbers = ((len(self.pieces) - arcs, "line"), (arcs, "arc"))
         kinds = " and ".join(f"{n} {kind}{'s' * (n > 1)}" for n, kind in numbers if n)
         ends = np.array([self.pieces[0].ends[0], self.pieces[-1].ends[1]])
-        first, last = np.where(np.abs(ends) < 1e-12 * self.size, 0.0, ends)
-        return f"Tool({kinds}{', closed, from' if self.closed else ' from'} {text(first)} to {text(last)})"
+        first, last = (coordinates(end, 6) for end in np.where(np.abs(ends) < 1e-12 * self.size, 0.0, ends))
+        return f"Tool({kinds}{', closed, from' if self.closed else ' from'} {first} to {last})"
 
     def _with_pieces(self, pieces: list) -> Tool:
         """Return a tool of other lines and arcs, closed if this tool is closed."""
@@ -336,14 +336,16 @@ class Tool:
             crosses = (s >= 0) & (s <= 1) & (t >= 0) & (t <= 1) & np.isfinite(s)
             if crosses.any():
                 k = int(np.argmax(crosses))
-                raise InputError(f"Tool: the profile crosses itself near (R, Z) = {text(a[i[k]] + s[k] * u[k])}")
+                place = coordinates(a[i[k]] + s[k] * u[k], 6)
+                raise InputError(f"Tool: the profile crosses itself near (R, Z) = {place}")
             length = np.maximum(np.hypot(*u.T), 1e-300)
             ends = np.stack([w, b[j] - a[i]])                                # parallel pieces that overlap
             distance, position = np.abs(_cross(u, ends)) / length, (u * ends).sum(-1) / length
             overlaps = (distance.max(0) < tolerance) & (position.max(0) > tolerance)
             overlaps &= position.min(0) < length - tolerance
             if overlaps.any():
-                raise InputError(f"Tool: the profile doubles back at (R, Z) = {text(a[j[np.argmax(overlaps)]])}")
+                place = coordinates(a[j[np.argmax(overlaps)]], 6)
+                raise InputError(f"Tool: the profile doubles back at (R, Z) = {place}")
 
 
 def _cross(u: np.ndarray, v: np.ndarray) -> np.ndarray:

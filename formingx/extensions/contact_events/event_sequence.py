@@ -22,6 +22,7 @@ from mpi4py import MPI
 from ...contact.step_limit import LIMITS
 from ...physics.contact_law import ContactStatus
 from ...ranks import combined, listed
+from ...solve.local_contact import LOCAL
 from ...values.tolerances import FAR, LARGE_ERROR
 from .reduced_contact import BodyResponse, CondensedPoints, ToolFrame
 
@@ -112,8 +113,6 @@ class EventSettings:
         max_iterations: maximum number of equilibrium iterations per event.
         surface_iterations: number of projections of closed points onto their tools, and maximum number of Newton
             iterations that locate a gap closure there. Both converge in a few steps if the tools are curved.
-        max_sliding_points: maximum number of points that slide at the accepted state. With more, their contact forces
-            follow from the stiffness in the factorised tangent instead of Coulomb's law.
         position_tolerance: convergence tolerance of the position of a gap closure, over the tributary length of the
             point. Most points with Coulomb friction stick near this position, too.
         arc_length_tolerance: convergence tolerance of the arc length of a gap closure, over its distance from the last
@@ -125,7 +124,6 @@ class EventSettings:
 
     max_iterations: int = 8
     surface_iterations: int = 4
-    max_sliding_points: int = 80
     position_tolerance: float = 1e-3
     arc_length_tolerance: float = LARGE_ERROR
     max_arc_length_change: float = 1.0
@@ -260,12 +258,12 @@ class ContactEventSequence:
         """Apply Coulomb's law to the points that slide at the accepted state; return False if this fails.
 
         In the factorised tangent their forces follow from its contact stiffness. If their number is at most
-        `EventSettings.max_sliding_points`, they are added to `_points`, and their forces become unknowns.
+        `LocalContact.max_points`, they are added to `_points`, and their forces become unknowns.
         """
         x, control = self._tangent[:2]
         points = self._points
         slide = self._area & ~self._free & ~points.sticks
-        if not 0 < combined(self._comm, int(np.sum(slide)), MPI.SUM) <= _SETTINGS.max_sliding_points:
+        if not 0 < combined(self._comm, int(np.sum(slide)), MPI.SUM) <= LOCAL.max_points:
             return True
         if not points.learn([np.flatnonzero(s) for s in points.of_faces(slide)], touched=True):
             return False

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...errors import ConvergenceError, InputError
-from ...findings import Finding
+from ...findings import Finding, coordinates
 from ...forms.history import Start
 from ...forms.transfer import MovingLeastSquares
 from ...mesh.nodes import matching_rows, without_round_off
@@ -142,7 +142,7 @@ class CoolingHistory:
             nearest = np.argsort(np.linalg.norm(nodes[:, :2] - place, axis=1))[:3]
             if 0 < nodes[nearest, 2].sum() < len(nearest):
                 R, Z = without_round_off(place, nodes[:, :2])
-                return f" at (R, Z) = ({R:.4g}, {Z:.4g}), where contact with {contact.contact.label!r} ends"
+                return f" at (R, Z) = {coordinates((R, Z))}, where contact with {contact.contact.label!r} ends"
         return ""
 
     def findings(self, states: Sequence[Any]) -> list[Finding]:

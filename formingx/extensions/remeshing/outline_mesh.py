@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
+from ...findings import coordinates
 from ...forms.outline import FINE_PIECES
 from ...mesh import with_gmsh
 from ...mesh.check import crossing_point
@@ -42,7 +43,7 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
     if (place := crossing_point(ring, following)) is not None:          # gmsh might not end
         r, z = without_round_off(place, ring)
         raise InputError(f"remesh: the outline of the body crosses itself with elements of this size near (r, z) ="
-                         f" ({r:.5g}, {z:.5g}): take a smaller Remesh(corner=) or Remesh(size=)")
+                         f" {coordinates((r, z), 5)}: take a smaller Remesh(corner=) or Remesh(size=)")
     try:
         with with_gmsh.model("body") as gmsh:
             geo = gmsh.model.geo
@@ -53,11 +54,11 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
             geo.addPlaneSurface([geo.addCurveLoop(lines)])
             geo.synchronize()
             gmsh.model.mesh.generate(2)
-            numbers, coordinates, _ = gmsh.model.mesh.getNodes()
+            numbers, positions, _ = gmsh.model.mesh.getNodes()
             _, triangles = gmsh.model.mesh.getElementsByType(2)
     except Exception as error:
         raise InputError(f"remesh: gmsh made no mesh of the body: {error}") from None
-    points = np.asarray(coordinates).reshape(-1, 3)[:, :2]
+    points = np.asarray(positions).reshape(-1, 3)[:, :2]
     points_at = {int(number): k for k, number in enumerate(numbers)}
     cells = np.array([points_at[int(t)] for t in triangles]).reshape(-1, 3)
     from scipy.spatial import cKDTree

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...contact import resultants
 from ...errors import InputError
-from ...findings import Finding, percent, register
+from ...findings import Finding, coordinates, percent, register
 from ...mesh.nodes import nearest
 from ...physics.supports import Symmetry
 from ...ranks import combined, gathered
@@ -44,9 +44,9 @@ def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
     wall = path.wall()
     share = float(wall.reference_area[wall.wrinkled].sum() / wall.reference_area.sum())
     if share >= NEGLIGIBLE:
-        place = ", ".join(f"{v:.4g}" for v in wall.middle[int(np.argmin(smaller_stress(wall.stretches)))])
+        place = coordinates(wall.middle[int(np.argmin(smaller_stress(wall.stretches)))])
         yield Finding("serious", "membrane", f"{100 * share:.3g} % of the sheet is in compression in the last state,"
-                      f" most at (x, y, z) = ({place}): it wrinkles there, and its wall depends on the mesh: use"
+                      f" most at (x, y, z) = {place}: it wrinkles there, and its wall depends on the mesh: use"
                       f" Membrane(wrinkles=0.01), and look at path.wall().wrinkled.")
 
 
@@ -60,8 +60,8 @@ def error_of_minimum_wall(path: Any) -> Iterator[Finding]:
     k = int(np.argmin(wall.wall))
     error = wall.error_of(k)
     if error > _LARGE_WALL_ERROR * wall.wall[k]:
-        place = ", ".join(f"{v:.4g}" for v in wall.middle[k])
-        yield Finding("warning", "wall", f"The minimum wall, {wall.wall[k]:.3g} at (x, y, z) = ({place}), is too large"
+        place = coordinates(wall.middle[k])
+        yield Finding("warning", "wall", f"The minimum wall, {wall.wall[k]:.3g} at (x, y, z) = {place}, is too large"
                       f" by about {error:.2g}: the triangles there are too coarse for it. Use smaller triangles, or"
                       f" trace(..., adapt_mesh={{'error': 0.1}}).")
 
@@ -77,9 +77,9 @@ def bridged_ridges(path: Any) -> Iterator[Finding]:
             fields = problem.x.array_r[:problem.n_owned]
             found = PassedTool(face).deepest(fields, path.last.control, LAGGED.max_passed_ratio, 0.0)
         if found is not None and found.ratio > LAGGED.max_passed_ratio:
-            place = ", ".join(f"{v:.4g}" for v in found.place)
+            place = coordinates(found.place)
             yield Finding("warning", face.contact.label, f"Triangles bridge the tool {face.contact.label!r}, which is"
-                          f" {found.depth:.2g} beyond them at (x, y, z) = ({place}): use smaller triangles there.")
+                          f" {found.depth:.2g} beyond them at (x, y, z) = {place}: use smaller triangles there.")
 
 
 @register("end")

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..._jit import CFunctions
+from ...findings import coordinates
 
 _C = CFunctions("extensions/space/layers.c")
 
@@ -59,13 +60,13 @@ class SelfPenetration:
             k = int(np.argmax(beyond))
             if beyond[k] > _BEYOND_PLANE * size:
                 yield (f"the sheet crosses the plane of symmetry {'xyz'[plane.axis]} = {plane.position:.4g} by"
-                       f" {beyond[k]:.3g} at (x, y, z) = ({_position(x[k])}), where its mirror image is: a tool between"
+                       f" {beyond[k]:.3g} at (x, y, z) = {coordinates(x[k])}, where its mirror image is: a tool between"
                        f" both halves is missing")
         found = crossings(x, self._whole.triangles, _DEPTH * size, _DEPTH_OF_WALL * self._thickness,
                           self._whole.reference, _CREASE * self._thickness)
         if len(found):
             k = int(np.argmax(found[:, 3]))
-            yield (f"the sheet passes through itself at (x, y, z) = ({_position(found[k, :3])}), where an edge of one"
+            yield (f"the sheet passes through itself at (x, y, z) = {coordinates(found[k, :3])}, where an edge of one"
                    f" layer is {found[k, 3]:.2g} beyond the other: a membrane has no contact with itself. Put a tool"
                    f" between the layers, such as half moulds that are solid up to their parting plane"
                    f" (fx.tools.half), or model one half with Symmetry there, or stop before they meet (until=)")
@@ -90,8 +91,3 @@ def crossings(points: np.ndarray, triangles: np.ndarray, least: float, wall: flo
         if count <= room:
             return found[:count]
         room = count
-
-
-def _position(x: np.ndarray) -> str:
-    """Return a position, shape (3,), as text."""
-    return ", ".join(f"{v:.4g}" for v in x)

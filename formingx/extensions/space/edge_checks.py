@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...checks.mould_side import free_distance
-from ...findings import Finding, register
+from ...findings import Finding, coordinates, register
 from ...physics.supports import Symmetry
 from .mould_checks import fixed_tools, nodes_and_direction, whole_extent
 from .tool_checks import files_of
@@ -39,8 +39,8 @@ def moulds_off_the_held_edge(body: Any) -> Iterator[Finding]:
         elif getattr(tool, "kind", "") != "extruded" and np.isfinite(under).any() and under.min() < _LEVEL * width:
             deep = np.isfinite(under) & (under > _DEEP * width)
             if deep.any():
-                x, y, _ = held[int(np.argmax(np.where(deep, under, 0.0)))]
-                yield Finding("warning", repr(contact), f"a part of the held edge, as at (x, y) = ({x:.4g}, {y:.4g}),"
+                place = coordinates(held[int(np.argmax(np.where(deep, under, 0.0))), :2])
+                yield Finding("warning", repr(contact), f"a part of the held edge, as at (x, y) = {place},"
                               f" lies over the cavity of the mould, whose other parts lie beside the sheet: move the"
                               f" mould or the sheet, or use a wider sheet")
 
@@ -62,7 +62,7 @@ def plugs_that_meet_the_held_edge(body: Any) -> Iterator[Finding]:
         if free[k] < max(travels):
             x, y, z = held[k]
             yield Finding("warning", repr(contact), f"after a travel of {body.format(free[k], 'travel', 3)} the tool"
-                          f" meets the held edge of the sheet at (x, y, z) = ({x:.4g}, {y:.4g}, {z:.4g}), which cannot"
+                          f" meets the held edge of the sheet at (x, y, z) = {coordinates((x, y, z))}, which cannot"
                           f" give way: use a smaller tool, a wider sheet or a shorter travel")
 
 

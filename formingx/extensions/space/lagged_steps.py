@@ -15,6 +15,7 @@ from mpi4py import MPI
 
 from ...contact.face import FaceContact
 from ...contact.step_limit import LIMITS, Approach, StepRejection
+from ...findings import coordinates
 from ...physics.contact_law import ContactHistory
 from ...ranks import combined
 from ...values.tolerances import NEGLIGIBLE
@@ -157,7 +158,7 @@ class LaggedApproach(Approach):
         passed = self.passed(new.x[:n], new.control)
         if passed is not None:
             return StepRejection(f"the tool of {self.face.contact.label!r} passes through the sheet at (x, y, z) ="
-                                 f" ({', '.join(f'{v:.3g}' for v in passed.place)}), where a triangle is"
+                                 f" {coordinates(passed.place, 3)}, where a triangle is"
                                  f" {passed.depth:.2g} beyond it: smaller triangles are needed there")
         found = super().rejection(old, new, n, length, ends)
         if found is not None or not length > LIMITS.min_length:

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...checks.mould_side import free_distance, moulds
-from ...findings import Finding, percent, register
+from ...findings import Finding, coordinates, percent, register
 from ...materials.inflation import FreeInflation, first_peak
 from ...mesh.nodes import nearest
 from ...physics.contact import Contact
@@ -97,7 +97,7 @@ def narrow_moulds(body: Any) -> Iterator[Finding]:
         if excessive and peak is not None:
             x, y, _ = points[~met][np.argmax(distance)]
             yield Finding("warning", repr(contacts[0]), f"the sheet hangs past the end of the mould:"
-                          f" {percent(1 - met.mean())} of its nodes, as at (x, y) = ({x:.4g}, {y:.4g}), have no tool"
+                          f" {percent(1 - met.mean())} of its nodes, as at (x, y) = {coordinates((x, y))}, have no tool"
                           f" straight ahead, and {excessive[0].text} is more than the"
                           f" {body.format(peak.pressure, 'pressure')} that a sheet of this overhang bears: it would be"
                           f" blown past the mould. Use a smaller sheet, or a mould with a wider flange")

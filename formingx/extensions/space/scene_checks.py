@@ -10,6 +10,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...errors import InputError, call_on_all_ranks, check_name, finite, positive, values
+from ...findings import coordinates
 from ...mesh.nodes import SAME_PLACE, arguments
 from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode, Symmetry
@@ -221,6 +222,6 @@ def check_contact(scene: Any, contact: Any) -> None:
     finite(f"{contact!r}: distance to the tool", float(depth[k]))
     h = sum(float(thickness(*points[k:k + 1].T)[0]) for thickness in scene.thickness.values())
     if depth[k] > max(1e-6 * length, NEGLIGIBLE * h):
-        place = ", ".join(f"{v:.6g}" for v in points[k])
-        raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = ({place}):"
+        place = coordinates(points[k], 6)
+        raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = {place}:"
                          f" move the tool (moved), or is the solid of its profile on the other side (Tool.reversed())?")

@@ -11,6 +11,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ...errors import InputError, as_list, check_name, check_type, non_negative, pair, positive
+from ...findings import coordinates
 from ...mesh import with_gmsh
 from ...mesh.check import crossing_point
 from ...mesh.divisions import MAX_RECTANGLES
@@ -188,7 +189,7 @@ def chords(edges: list[Edge], caller: str) -> np.ndarray:
     for edge in edges:
         a, b = np.array(edge.start), np.array(edge.end)
         if not np.any(a != b):
-            raise InputError(f"{caller}: the corner ({a[0]:.6g}, {a[1]:.6g}) is there twice, one after the other")
+            raise InputError(f"{caller}: the corner {coordinates(a, 6)} is there twice, one after the other")
         line = a + np.linspace(0, 1, 2 if edge.centre is None else 9)[:-1, None] * (b - a)
         if edge.centre is not None:
             away = line - edge.centre
@@ -196,7 +197,7 @@ def chords(edges: list[Edge], caller: str) -> np.ndarray:
         points.append(line)
     x = np.concatenate(points)
     if (place := crossing_point(x, np.column_stack([np.arange(len(x)), np.roll(np.arange(len(x)), -1)]))) is not None:
-        raise InputError(f"{caller}: crosses or touches itself near ({place[0]:.6g}, {place[1]:.6g})")
+        raise InputError(f"{caller}: crosses or touches itself near {coordinates(place, 6)}")
     return x
 
 
@@ -217,7 +218,7 @@ class _Size:
 
     def __call__(self, x: float, y: float) -> float:
         """Return the edge length of triangles at a point (x, y), length; raise an InputError unless it is positive."""
-        where = f"sheet: size at ({x:.6g}, {y:.6g})"
+        where = f"sheet: size at {coordinates((x, y), 6)}"
         try:
             return positive(where, float(self._size(x, y)))
         except InputError:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...errors import InputError
+from ...findings import coordinates
 from ...mesh.edges import edges_of
 from .bodies import merged
 from .crossing import crossings
@@ -60,7 +61,7 @@ def check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None
                                     " {at}: let the program that wrote it unify its normals")):
         if bad.any():
             x = points[edges[np.argmax(bad)]].mean(0)
-            at = "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
+            at = coordinates(x, 6)
             raise InputError(f"{caller} {words.format(n=int(bad.sum()), at=at)}")
 
 
@@ -70,6 +71,6 @@ def check_simple(points: np.ndarray, triangles: np.ndarray, caller: str) -> None
     found = crossings(points, triangles, _NEGLIGIBLE_CROSSING * size)
     if len(found):
         *x, depth = found[np.argmax(found[:, 3])]
-        at = "(" + ", ".join(f"{v:.6g}" for v in x) + ")"
+        at = coordinates(x, 6)
         raise InputError(f"{caller} passes through itself at {len(found)} places, an edge by {depth:.3g} at {at}:"
                          f" inside and outside are not defined there: unite or trim its parts where it was drawn")

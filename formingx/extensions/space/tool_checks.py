@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...contact.tooling import Tooling
-from ...findings import Finding, percent, register
+from ...findings import Finding, coordinates, percent, register
 from ...ranks import gathered
 from ...tools.pieces import Arc
 from ...values.tolerances import LARGE_ERROR
@@ -52,10 +52,10 @@ def unresolved_files(body: Any) -> Iterator[Finding]:
         for tool in files_of(contact.tool):
             ratio, place = tool.roughness
             if ratio > LARGE_ERROR:
-                position = ", ".join(f"{v:.4g}" for v in place)
+                position = coordinates(place)
                 yield Finding("warning", repr(contact), f"the triangles of {tool.name!r} do not resolve its surface:"
                               f" their normals miss those of a smooth surface by {percent(ratio)} of the angles"
-                              f" between triangles, most at (x, y, z) = ({position}). Edges cross the triangles, or"
+                              f" between triangles, most at (x, y, z) = {position}. Edges cross the triangles, or"
                               f" the points are noisy: a sheet that slides may stop there. Write the file with"
                               f" triangles along its edges, or as STEP, or use crease=0 for its flat triangles")
 
@@ -78,7 +78,7 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
         if edge < radius:
             radius, place = edge, None
         if radius < length:
-            position = "" if place is None else f", as at (x, y, z) = ({', '.join(f'{v:.4g}' for v in place)})"
+            position = "" if place is None else f", as at (x, y, z) = {coordinates(place)}"
             slides = "" if contact.sticks else ", and a sheet that slides may not converge"
             yield Finding("warning", repr(contact), f"it has fillets of radius {radius:.3g}{position}, and half of the"
                           f" edges of the triangles are longer than {length:.4g}: the wall there will be too thick or"
@@ -130,7 +130,7 @@ def sharp_ridges(body: Any) -> Iterator[Finding]:
     """
     for contact in body.scene.contacts:
         for _, places, advice in _ridges(contact):
-            ends = " to ".join(f"({', '.join(f'{v:.4g}' for v in place)})" for place in places[[0, -1]])
+            ends = " to ".join(map(coordinates, places[[0, -1]]))
             yield Finding("serious", repr(contact), f"its sides meet at a sharp ridge from (x, y, z) = {ends}. A sheet"
                           f" that slides stops where a node meets it. Round it: {advice}")
 
@@ -207,10 +207,10 @@ def rough_thickness(body: Any) -> Iterator[Finding]:
         share = float(area @ error / (area @ middle))
         if share > _COARSE_WALL:
             k = int(np.argmax(error))
-            position = ", ".join(f"{v:.4g}" for v in corners[k].mean(0))
+            position = coordinates(corners[k].mean(0))
             yield Finding("warning", f"thickness of {name!r}", f"the thickness varies within the triangles: its mean at"
                           f" their corners misses that in their middle by {percent(share)} on average, most at (x, y,"
-                          f" z) = ({position}). Use smaller triangles, or a smoother thickness")
+                          f" z) = {position}. Use smaller triangles, or a smoother thickness")
 
 
 def _median_edge(mesh: Any) -> float:

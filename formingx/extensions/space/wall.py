@@ -11,6 +11,7 @@ import numpy as np
 
 from ... import figures
 from ...errors import InputError, as_points, count, direction, finite, pair, positive, triple
+from ...findings import coordinates
 from ...mesh.divisions import MAX_RECTANGLES
 from ...mesh.edges import edges_of
 from ...mesh.nodes import cell_node_positions, own_cells, without_round_off
@@ -159,7 +160,7 @@ class SheetWall(ColumnTable):
         if away.min() > np.linalg.norm(np.diff(self.reference_points[self.triangles], axis=1), axis=2).max():
             n, ends = len(place), without_round_off([*X.min(0), *X.max(0)], X)
             spans = " and ".join(f"{axis} from {ends[k]:.4g} to {ends[n + k]:.4g}" for k, axis in enumerate("XYZ"[:n]))
-            raise InputError(f"thickness_at: ({', '.join(f'{v:.6g}' for v in place)}) is not on the modelled sheet,"
+            raise InputError(f"thickness_at: {coordinates(place, 6)} is not on the modelled sheet,"
                              f" {spans}")
         return float(self.at_nodes[np.argmin(away)])
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, check_type, finite
+from ...findings import coordinates
 from ...mesh.grid import gathered, to_mesh
 from ...mesh.mesh import Mesh
 from .instability import CriticalPoint
@@ -45,7 +46,7 @@ def with_imperfection(mesh: Mesh, mode: Any, amplitude: float) -> Mesh:
     found = [numbers.get(tuple(key), -1) for key in of_mesh.tolist()]
     if min(found) < 0:
         R, Z = grid.points[int(np.argmin(found))]
-        raise InputError(f"with_imperfection: mode: it has no node at (R, Z) = ({R:.6g}, {Z:.6g}): it is of"
+        raise InputError(f"with_imperfection: mode: it has no node at (R, Z) = {coordinates((R, Z), 6)}: it is of"
                          " another mesh")
     moved = grid.points + amplitude * mode.amplitudes[found][:, : grid.points.shape[1]]
     return to_mesh(lambda: grid._replace(points=moved), mesh.comm, "with_imperfection: the moved mesh")

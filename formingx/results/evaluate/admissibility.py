@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...contact import resultants
-from ...findings import Finding, percent
+from ...findings import Finding, coordinates, percent
 from ...forms.outline import Outline, edge_points
 from ...mesh.nodes import without_round_off
 from ...ranks import gathered
@@ -117,7 +117,7 @@ class AdmissibilityCheck:
                                          f" about {percent(error)}: {_penalty_advice(contact, error)}."))
             for cut in self._deepest(edges, lengths, state, on_face=True):
                 found.append(Finding("warning", cut.name, f"Between contact points the face is {cut.depth:.3g} deep in"
-                                     f" the tool of {cut.name!r} at (r, z) = ({cut.place[0]:.5g}, {cut.place[1]:.5g}):"
+                                     f" the tool of {cut.name!r} at (r, z) = {coordinates(cut.place, 5)}:"
                                      f" smaller elements there, or a larger fillet."))
         return found
 
@@ -144,14 +144,14 @@ class AdmissibilityCheck:
         with self._problem.state_context(state) as problem:
             bad, cells, (R, Z) = problem.admissible.inverted_elements()
             if bad > max(_LIMITS.allowed_elements, _LIMITS.inverted_elements * cells):
-                yield (f"{bad} of {cells} elements are inside out, the worst at (R, Z) = ({R:.5g}, {Z:.5g}):"
+                yield (f"{bad} of {cells} elements are inside out, the worst at (R, Z) = {coordinates((R, Z), 5)}:"
                        " remesh on the way (trace(remesh=Remesh(size=...)), for a crushed block), or adapt the mesh"
                        f" by a pilot run (trace(adapt_mesh=True), for a sheet over an edge)")
             edges = self._outline.edges()
             lengths = _lengths(edges)
             for deep in self._deepest(edges, lengths, state, on_face=False):
                 yield (f"the body is {deep.depth:.4g} deep in the tool of {deep.name!r} at (r, z) ="
-                       f" ({deep.place[0]:.5g}, {deep.place[1]:.5g}): a face without a Contact is there, or the"
+                       f" {coordinates(deep.place, 5)}: a face without a Contact is there, or the"
                        f" elements are too large for the tool")
             for deep in self._excess_penetration(edges, lengths, state):
                 yield (f"the body did not follow the tool of {deep.name!r}: contact points are {deep.depth:.4g} deep in"
@@ -168,7 +168,7 @@ class AdmissibilityCheck:
                            f" hold it: it is behind the tool")
         place = self._outline.self_intersection(edges)
         if place is not None:
-            yield f"the body folds: its boundary goes through itself near (r, z) = ({place[0]:.5g}, {place[1]:.5g})"
+            yield f"the body folds: its boundary goes through itself near (r, z) = {coordinates(place, 5)}"
 
     def _deepest(self, edges: np.ndarray, lengths: np.ndarray, state: State, on_face: bool) -> Iterator[Depth]:
         """Yield for each active tool of a section the deepest point of the boundary in it, if deeper than allowed.

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...findings import Finding
+from ...findings import Finding, coordinates
 from .profile import FACES
 
 _CREASED = 3 / 4
@@ -64,7 +64,7 @@ def findings(crease: Crease | None) -> list[Finding]:
     """Return a warning in a list if a face creases; else an empty list."""
     if crease is None or crease.stretch >= _CREASED:
         return []
-    return [Finding("warning", crease.face, f"Near (r, z) = ({crease.point[0]:.5g}, {crease.point[1]:.5g}) the face"
+    return [Finding("warning", crease.face, f"Near (r, z) = {coordinates(crease.point, 5)} the face"
                     f" {crease.face!r} is compressed to {crease.stretch:.2g} of its length between parts that stick to"
                     " the tool: it creases. Walls near there depend on the elements and do not converge on finer"
                     " meshes. Use a larger fillet there, or a contact that slides.")]

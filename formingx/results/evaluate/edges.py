@@ -6,7 +6,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...findings import Finding
+from ...findings import Finding, coordinates
 from ...ranks import gathered
 
 EDGE_ANGLE = 40.0
@@ -65,6 +65,6 @@ def findings(edge: SharpEdge | None) -> list[Finding]:
     if edge is None or edge.turn < EDGE_ANGLE:
         return []
     return [Finding("warning", edge.tool, f"The body slides over an edge of {edge.tool!r} near (r, z) ="
-                    f" ({edge.point[0]:.5g}, {edge.point[1]:.5g}), and from one contact point to the next the tool"
+                    f" {coordinates(edge.point, 5)}, and from one contact point to the next the tool"
                     f" turns by {edge.turn:.0f} degrees: forces go up and down as points leave that edge. Use smaller"
                     f" elements on the face that slides, or a larger fillet.")]

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...errors import InputError
+from ...findings import coordinates
 from ...values.tolerances import LARGE_ERROR
 
 
@@ -102,17 +103,14 @@ class StressPeak(NamedTuple):
         return self.doubtful + self.doubtful_error - self.value <= LARGE_ERROR * abs(self.value)
 
     def __str__(self) -> str:
-        largest = f"the largest sigma_1 is {self.value:.4g} at {_show(self.point)}, estimated error {self.error:.2g}"
+        largest = (f"the largest sigma_1 is {self.value:.4g} at (R, Z) = {coordinates(self.point)}, estimated error"
+                   f" {self.error:.2g}")
         if self.converged:
             return largest
-        return (f"the stress peak at {_show(self.doubtful_point)} has not converged: sigma_1 is {self.doubtful:.4g}"
-                f" there, its estimated error {self.doubtful_error:.2g} ({largest}). Refine the mesh there; where a"
-                f" tool has a sharp edge, a clamp begins or sticking contact ends, stress has no limit")
-
-
-def _show(point: np.ndarray) -> str:
-    """Return a reference position, shape (2,), as text."""
-    return f"(R, Z) = ({point[0]:.4g}, {point[1]:.4g})"
+        return (f"the stress peak at (R, Z) = {coordinates(self.doubtful_point)} has not converged: sigma_1 is"
+                f" {self.doubtful:.4g} there, its estimated error {self.doubtful_error:.2g} ({largest}). Refine the"
+                f" mesh there; where a tool has a sharp edge, a clamp begins or sticking contact ends, stress has no"
+                f" limit")
 
 
 class Fitted(NamedTuple):
