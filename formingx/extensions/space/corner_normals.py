@@ -67,7 +67,9 @@ def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> 
         tilted = np.linalg.norm(normals - facet, axis=2) > 2 * np.sin(np.radians(crease) / 2)
         if not tilted.any():
             return normals
-        near = np.isin(triangles, triangles[tilted]).any(1)   # triangles at a vertex with such a normal
+        touched = np.zeros(len(points), dtype=bool)           # vertices of such triangles
+        touched[triangles[tilted]] = True
+        near = touched[triangles].any(1)
         limit = _REDUCTION * turn[(near[i] | near[j]) & (turn < limit)].max(initial=0.0)
     return np.repeat(facet, 3, axis=1)
 

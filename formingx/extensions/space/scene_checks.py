@@ -16,13 +16,15 @@ from ...physics.loads import CentrifugalLoad, Pressure
 from ...physics.supports import PinnedNode, Symmetry
 from ...ranks import combined, gathered
 from ...values.tolerances import NEGLIGIBLE
-from .surface_mesh import SurfaceMesh
+from .surface_mesh import SurfaceMesh, closest_points
 
 _EXTENT_RATIO = 9.0
 """Ratio of the largest extents of tool and sheet, either way, from which their units of length probably differ.
 
 The sheet may be a quarter of the whole.
 """
+
+_MOST_COMPARED = 200       # of points of a tool, with the triangles of the sheet
 
 _PUSHER_RATIO = 100.0
 """The same ratio for a smaller tool that moves, such as a ball or a pin that is pushed into the sheet."""
@@ -225,3 +227,29 @@ def check_contact(scene: Any, contact: Any) -> None:
         place = coordinates(points[k], 6)
         raise InputError(f"{contact!r}: the sheet starts inside the tool: {depth[k]:.6g} deep at (x, y, z) = {place}:"
                          f" move the tool (moved), or is the solid of its profile on the other side (Tool.reversed())?")
+    _check_between_nodes(contact, mesh, max(1e-6 * length, NEGLIGIBLE * h))
+
+
+def _check_between_nodes(contact: Any, mesh: SurfaceMesh, near: float) -> None:
+    """Check that no corner of the tool's triangles lies behind a flat sheet, between its nodes; collective.
+
+    Raise `InputError` if one does. near: distance that is allowed, length.
+    """
+    if not mesh.flat or not contact.tool.sized:
+        return
+    points, triangles = mesh.whole()
+    depth = -mesh.faces[contact.on] * _upward(points, triangles) * contact.tool.surface()[0][:, 2]
+    behind = contact.tool.surface()[0][depth > near]
+    inside = ((behind[:, :2] > points[:, :2].min(0)) & (behind[:, :2] < points[:, :2].max(0))).all(1)
+    behind = behind[inside] * (1, 1, 0)
+    behind = behind[:: max(len(behind) // _MOST_COMPARED, 1)]
+    on = behind[closest_points(behind, points[triangles])[2] < near]
+    if len(on):
+        raise InputError(f"{contact!r}: the sheet starts inside the tool: a part of it, at (x, y) = ({on[0, 0]:.6g},"
+                         f" {on[0, 1]:.6g}), is behind the sheet between its nodes: move the tool (moved)")
+
+
+def _upward(points: np.ndarray, triangles: np.ndarray) -> float:
+    """Return 1 if the triangles of a flat sheet are counter-clockwise from above, else -1."""
+    a, b, c = points[triangles[0]]
+    return float(np.sign(np.cross(b - a, c - a)[2]))
