@@ -143,14 +143,51 @@ def test_radiation_against_the_method_of_lines():
     assert np.abs(body.basis.shapes(x) @ T[0] - wanted[0]).max() < 1e-3 * rise
 
 
-def test_a_stretched_sheet_cools_as_a_thin_one():
-    """A column of 2, stretched to twice its area, has at each depth the temperatures of a sheet of thickness 1."""
-    h, air = (1e-3, 5e-5), (40.0, 20.0)
+@pytest.mark.parametrize("ratio", [1.0, 2.0])
+def test_temperatures_belong_to_the_present_thickness(ratio):
+    """A column of 2, unstretched and stretched to twice its area, in air: the temperatures of a slab of 2 and of 1."""
+    h, air, slab = (1e-3, 5e-5), (40.0, 20.0), exact.Slab(2.0 / ratio, 0.2e-3, 2e-3)
     laws = [fx.Convection("bottom", h=h[0], air=air[0]), fx.Convection("top", h=h[1], air=air[1])]
-    body = columns(laws, (2.0,), ratio=2.0)
+    body = columns(laws, (2.0,), ratio=ratio)
     (T,), *_ = integrate(body, 2.0, 2e-3)
-    assert body.basis.shapes(DEPTHS) @ T[0] == pytest.approx(exact.series(SLAB, 150.0, h, air, DEPTHS, [2.0])[0],
-                                                             abs=0.1)
+    wanted = exact.series(slab, 150.0, h, air, slab.thickness * DEPTHS, [2.0])[0]
+    assert body.basis.shapes(DEPTHS) @ T[0] == pytest.approx(wanted, abs=0.1)
+
+
+def test_a_stretched_sheet_touches_a_tool_with_its_present_area():
+    """A column of 2, stretched to twice its area, on steel: the temperatures of a slab of thickness 1."""
+    body = columns([fx.ContactWithTool("bottom", conductance=1e-3, tool=STEEL), fx.Convection("top", h=1e-5, air=25.0)],
+                   (2.0,), ratio=2.0)
+    (T, _), *_ = integrate(body, 0.5, 2e-3)
+    wanted, _ = exact.sheet_on_tool(SLAB, exact.Slab(20.0, 40e-3, 3.611e-3), 1e-3, 150.0, 30.0, 1e-5, 25.0, DEPTHS,
+                                    [0.0], [0.5])
+    assert body.basis.shapes(DEPTHS) @ T[0] == pytest.approx(wanted[0], abs=0.1)
+
+
+def test_a_stage_solves_its_implicit_equation():
+    """M D = k + c R(y + D) in columns of two thicknesses, with laws that are not linear and a tool that conducts."""
+    body = columns([fx.ContactWithTool("bottom", conductance=1e-3, tool=STEEL),
+                    fx.Radiation("top", emissivity=0.9, heater=500.0, stefan_boltzmann=5.67e-14)], (1.0, 2.0), 1.5)
+    state, c = body.start(), 0.7
+    known = [1e-3 * part for part in state]
+    found = body.stage(state, known, c, state[0])
+    assert np.abs(found.changes[0]).max() > 5.0
+    assert body.mass(found.changes[0]) == pytest.approx(known[0] + c * found.rates[0], abs=1e-9)
+
+
+def test_slope_of_a_law_is_the_derivative_of_its_flux():
+    law, = columns([fx.Radiation("top", emissivity=0.9, heater=500.0, stefan_boltzmann=5.67e-14)])._laws
+    flux, slope = law.flux(np.array([150.0]))
+    quotient = (law.flux(np.array([150.01]))[0] - law.flux(np.array([149.99]))[0]) / 0.02
+    assert slope == pytest.approx(quotient, rel=1e-6) and abs(slope[0] * 1e-2) < flux[0]
+
+
+def test_layers_absorb_what_does_not_pass_them():
+    """Radiation of 0.02 into two layers: together they absorb 1 - exp(-a h) of it."""
+    basis = ColumnBasis([0.25, 0.75], [POLYMER, POLYMER], ["skin", "core"])
+    body = ColumnConduction(Nodes([1.0]), basis, [fx.Absorption("bottom", flux=0.02, coefficient=1.5)],
+                            np.array([150.0]), -273.15)
+    assert body.rates(body.start())[1][0] == pytest.approx(0.02 * (1 - np.exp(-1.5)), rel=1e-9)
 
 
 def test_layers_against_a_section():

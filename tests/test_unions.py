@@ -39,6 +39,17 @@ def test_distance_to_parts_is_the_nearest(tmp_path):
     assert len(points) == sum(len(part.surface()[0]) for part in apart) and triangles.max() == len(points) - 1
 
 
+def test_normal_and_hessian_at_a_fillet_are_derivatives_of_the_distance():
+    tool, e = fx.tools.union(BOX, RIB, fillet=0.2), 1e-6
+    x = np.random.default_rng(3).uniform((0.1, -1.0, -0.6), (0.6, 1.0, -0.3), (300, 3))
+    found = tool.distances(x)
+    normal, hessian = (np.stack([(value(x + h) - value(x - h)) / (2 * e) for h in e * np.eye(3)], -1)
+                       for value in (tool.signed_distance, lambda x: tool.distances(x).normal))
+    assert (np.abs(hessian).max((1, 2)) > 2).mean() > 0.1                     # in the fillet
+    assert np.quantile(np.abs(normal - found.normal).max(1), 0.97) < 1e-7     # a few lie where two arcs meet
+    assert np.quantile(np.abs(hessian - found.hessian).max((1, 2)), 0.97) < 1e-5
+
+
 @pytest.mark.parametrize("parts, options, text", [
     ([BOX], {}, "1 parts"), ([BOX, fx.tools.plane(0.0)], {}, "a tool in three dimensions"),
     ([BOX, RIB], {"names": ["a"]}, "one for each of the 2"), ([BOX, RIB], {"names": ["a", "a"]}, "each another")])
