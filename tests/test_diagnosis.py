@@ -10,6 +10,7 @@ from conftest import ROOT, drawn, run_json, treloar
 from test_contact import cup
 
 import formingx as fx
+from formingx.checks import failed_run
 from formingx.solve import diagnose
 
 
@@ -48,7 +49,7 @@ def test_an_earlier_limit_point_is_not_named_as_cause():
     facts = {"what": "travel", "limit_points": (0.54, 0.51)}
     for control, is_cause in ((0.53, True), (0.73, False)):
         run = diagnose.FailedRun({**facts, "control": control}, None, None, target=0.9)
-        assert bool(list(diagnose._limit_point_findings(run))) is is_cause
+        assert bool(list(failed_run.limit_point_findings(run))) is is_cause
 
 
 @pytest.mark.thorough
@@ -222,5 +223,5 @@ def test_a_script_that_stops_in_an_error_ends():
 def test_a_tangent_that_becomes_singular_is_named(grown, named):
     """Its condition number has grown within a few states, and no limit point explains it."""
     facts = {"what": "pressure", "condition_before": 1e10, "condition": grown * 1e10}
-    found = list(diagnose._branch_findings(diagnose.FailedRun(facts, None, None)))
+    found = list(failed_run.branch_findings(diagnose.FailedRun(facts, None, None)))
     assert any("becomes singular, and there is no limit point" in cause.text for cause in found) == named

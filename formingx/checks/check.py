@@ -11,12 +11,12 @@ from ..scene.scene import Scene
 from ..solve.branches import ANOTHER_PATH
 from ..solve.stage import Stage, plan
 from ..units import NONE, Units
-from . import end_of_run, parallel, promised_walls, ranges, scenes, tool_contact, vents
+from . import end_of_run, failed_run, parallel, promised_walls, ranges, scenes, tool_contact, vents
 from .sizes import SizedBody
 
 # the imported modules register their checks
-__all__ = ["Report", "before_run", "check", "end_of_run", "parallel", "promised_walls", "ranges", "scenes",
-           "tool_contact", "vents"]
+__all__ = ["Report", "before_run", "check", "end_of_run", "failed_run", "parallel", "promised_walls", "ranges",
+           "scenes", "tool_contact", "vents"]
 
 
 class Report:

@@ -76,13 +76,9 @@ class Approach:
             if the result does not depend on the order of the gap closures.
     """
 
-    usual_closures: float = 1
-    """Meaning of `Contact.nodes_per_step` None: a number of nodes, or a share of the nodes of the face below 1."""
-
     def __init__(self, face: FaceContact, conducts: bool):
-        self.face, self._comm, given = face, face.comm, face.contact.nodes_per_step
+        self.face, self._comm, given = face, face.comm, face.contact.max_closures
         self.points = combined(face.comm, len(face.rule.points))
-        given = self.usual_closures if given is None else given
         nodes = max(int(given * self.points), 1) if given < 1 else int(given)
         self.max_closures = nodes * (1 if face.law.has_history or conducts else 10)
         self._predicted_closures = 0                        # number in the step, on all ranks

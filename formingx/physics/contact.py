@@ -101,6 +101,7 @@ class Contact(ScenePart):
         sticks: True if points in contact never slide: with "stick", and for mu of 100 or larger.
         lagged: True for tools in three dimensions. A point whose gap closes in a step is then in contact from the next
             step on.
+        max_closures: `nodes_per_step`, or its value for None.
 
     Raises:
         InputError: an argument is not allowed.
@@ -111,7 +112,7 @@ class Contact(ScenePart):
     """
 
     quantity = "travel"
-    described = ("mu", "driven", "friction_by_temperature", "sticks", "lagged")
+    described = ("mu", "driven", "friction_by_temperature", "sticks", "lagged", "max_closures")
     on: str
     tool: Any
     mu: Any
@@ -140,6 +141,7 @@ class Contact(ScenePart):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: a point that pulls at the tool has"
                              f" no Coulomb friction; use 'stick' or 'none'")
         self.nodes_per_step = closures(f"{name}: nodes_per_step", nodes_per_step, three_d)
+        self.max_closures = self.nodes_per_step or (0.01 if three_d else 1)
         self.points = contact_points(f"{name}: points", points)
         self.present_area = check_type(f"{name}: present_area", present_area, bool, "True or False")
         if present_area and (self.friction_by_temperature or self.mu > 0 or not self.separates):

@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from .. import figures
 from ..contact.tooling import Tooling
 from ..errors import InputError
+from ..figures.deformed import draw_volume_ratios
 from ..forms.elements import Body, body
 from ..mesh.nodes import dof_positions
 from ..mesh.triangles import Place, place
@@ -119,7 +119,7 @@ class Examination:
                              " thickness, and without a good state there is no shape")
         if self._problem.comm.rank == 0:
             os.makedirs(os.path.dirname(os.path.abspath(file)), exist_ok=True)
-            _draw(self._elements, self._marks, self._tools, title, file)
+            draw_volume_ratios(self._elements, self._marks, self._tools, title, file)
 
 
 def _layer(problem: Any, tag: int) -> str:
@@ -140,15 +140,11 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
     Residuals are {field: norm over the norm of the support forces}, for "displacement", "pressure" and "multipliers".
     The place is a `Place` with layer and nearest boundary; the reference position (R, Z) has the shape (2,), length.
     """
-    out, comm, space = x.duplicate(), problem.comm, problem.forms.space
+    out, comm = x.duplicate(), problem.comm
     problem.residual(x, control, out)
-    values, n = out.array_r.copy(), space.dofmap.index_map.size_local
+    values, n = out.array_r.copy(), problem.n_owned
     out.destroy()
-    vectors, numbers = space.sub(0).collapse()
-    dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
-    points = dof_positions(vectors)[: len(dofs)]
-    own = dofs[:, 0] < n
-    dofs, points = dofs[own], points[own]
+    dofs, points = _own_nodes(problem)
     is_u = np.zeros(n, dtype=bool)
     is_u[dofs.ravel()] = True
     parts = {"displacement": values[:n][is_u], "pressure": values[:n][~is_u], "multipliers": values[n:]}
@@ -165,23 +161,28 @@ def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], 
     return residual, place(problem.scene.mesh, point), point
 
 
-def _deformed_position(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
-    """Return the deformed position in a state of the node at a reference point, shape (2,), length."""
+def _own_nodes(problem: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Return the displacement unknowns and reference positions, length, of owned nodes, shape (n, components) both."""
     vectors, numbers = problem.forms.space.sub(0).collapse()
     dofs = np.asarray(numbers, dtype=np.int64).reshape(-1, problem.forms.domain.geometry.dim)
-    points = dof_positions(vectors)[: len(dofs)]
-    own = dofs[:, 0] < problem.forms.space.dofmap.index_map.size_local
-    away = np.linalg.norm(points[own] - point, axis=1)
+    own = dofs[:, 0] < problem.n_owned
+    return dofs[own], dof_positions(vectors)[: len(dofs)][own]
+
+
+def _deformed_position(problem: Any, state: Any, point: np.ndarray) -> np.ndarray:
+    """Return the deformed position in a state of the node at a reference point, shape (2,), length."""
+    dofs, points = _own_nodes(problem)
+    away = np.linalg.norm(points - point, axis=1)
     at = int(np.argmin(away)) if len(away) else 0
     mine = (np.inf, [0.0] * len(point))
     if len(away):
-        mine = (float(away[at]), (problem.forms.length * state.x[dofs[own][at]]).tolist())
+        mine = (float(away[at]), (problem.forms.length * state.x[dofs[at]]).tolist())
     return point + np.array(min(problem.comm.allgather(mine))[1])
 
 
 def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
     """Return the masks of the locally owned points in contact, shape (n,), for every active contact."""
-    return [c.touching(x[: problem.forms.space.dofmap.index_map.size_local], control) for c in problem.contact.faces]
+    return [c.touching(x[: problem.n_owned], control) for c in problem.contact.faces]
 
 
 def _status_changes(problem: Any, attempt: Any) -> int | None:
@@ -191,7 +192,7 @@ def _status_changes(problem: Any, attempt: Any) -> int | None:
     """
     if not problem.contact.faces:
         return None
-    n, count = problem.forms.space.dofmap.index_map.size_local, 0
+    n, count = problem.n_owned, 0
     before = attempt.x - attempt.dx, attempt.control - attempt.dcontrol
     for contact, a, b in zip(problem.contact.faces, _touching(problem, *before),
                              _touching(problem, attempt.x, attempt.control), strict=True):
@@ -199,37 +200,3 @@ def _status_changes(problem: Any, attempt: Any) -> int | None:
                   for x, c in (before, (attempt.x, attempt.control))]
         count += int(np.sum((a != b) | (a & b & (slides[0] != slides[1]))))
     return problem.comm.allreduce(count, MPI.SUM)
-
-
-def _draw(elements: Body, marks: list, tools: list, title: str, file: Any) -> None:
-    """Write a picture of deformed elements, coloured by the volume ratio J, with marked points and tools.
-
-    marks: list of (label, deformed position). tools: list of (tool, its displacement). file: name of the picture; its
-    ending is the format.
-    """
-    from matplotlib.collections import PolyCollection
-    size = np.ptp(elements.outline, axis=(0, 1))
-    wide = size[0] > 4 * size[1]
-    height = float(np.clip(7.0 * size[1] / size[0], 2.0, 7.0)) + 1.2
-    figure, axes = figures.figure(width=8.0, height=height)
-    J = elements.J[np.arange(len(elements.J)), np.argmax(np.abs(elements.J - 1), axis=1)]
-    reach = float(np.clip(np.abs(J - 1).max(), 1e-3, 1.0))
-    drawn = PolyCollection(list(elements.outline), array=J, cmap="RdBu", edgecolors="0.35", linewidths=0.4,
-                           clim=(1 - reach, 1 + reach))
-    axes.add_collection(drawn)
-    for (label, point), mark, colour in zip(marks, "osD^", ("tab:red", "black", "tab:purple", "tab:green")):
-        axes.plot(*point, mark, label=label, markersize=11, fillstyle="none", markeredgewidth=1.8, color=colour,
-                  zorder=3, clip_on=False)
-    axes.autoscale_view()
-    axes.set_aspect("equal", adjustable="datalim" if wide else "box")
-    axes.set_xlabel("r")
-    axes.set_ylabel("z")
-    axes.set_title(title, fontsize=10)
-    figure.colorbar(drawn, ax=axes, label="J where it is farthest from 1 in the element", shrink=0.85, extend="both")
-    if marks:
-        figure.legend(loc="outside lower center", ncols=len(marks), frameon=False, fontsize=9)
-    figure.draw_without_rendering()                        # the aspect changes the limits
-    axes.autoscale(False)
-    low, high = np.array([axes.get_xlim(), axes.get_ylim()]).T
-    figures.tools(axes, tools, low, high, mirror=elements.outline[..., 0].min() > -1e-9 * size[0])
-    figure.savefig(file, dpi=150)

@@ -74,8 +74,6 @@ class LaggedApproach(Approach):
         conducts: True if heat flows through points in contact, from the end of the step on.
     """
 
-    usual_closures = 0.01
-
     def __init__(self, face: FaceContact, conducts: bool):
         super().__init__(face, conducts)
         self._last: tuple[np.ndarray, float, PassedPoint | None] | None = None        # result of `passed`, and where
