@@ -1,9 +1,10 @@
 """The demos of bottles in three dimensions, quick and in full, with their key numbers."""
 
+import importlib
 import json
 
 import pytest
-from conftest import drawn
+from conftest import ROOT, drawn
 from test_demos import summary
 
 
@@ -29,6 +30,25 @@ def test_square_bottle(tmp_path):
     assert found["inflation"]["limit_pressure_R_over_mu_H"] == pytest.approx(0.91071, rel=1e-3)
     assert found["inflation"]["limit_volume_over_first"] == pytest.approx(2.7368, rel=1e-3)
     assert drawn(tmp_path / "square_bottle_3d.png")
+
+
+@pytest.mark.thorough
+def test_walls_of_a_short_round_bottle_miss_those_of_a_solid_by_its_thickness(monkeypatch):
+    """A membrane has no bending stiffness. Bands next to the neck differ most, in proportion to wall over radius."""
+    monkeypatch.syspath_prepend(ROOT / "demos")
+    demo = importlib.import_module("square_bottle")
+    monkeypatch.setattr(demo, "RADIUS", 20.0)
+    monkeypatch.setattr(demo, "ROUND_LENGTH", 60.0)
+    monkeypatch.setattr(demo, "ROUND_MOULD", {
+        "radius": 40.0, "height": 50.0, "neck": 22.0, "shoulder": 14.0, "neck_height": 8.0, "base": -72.0,
+        "fillet": 10.0, "shoulder_fillet": 10.0})
+    bands = []
+    for wall in (0.5, 0.25):
+        monkeypatch.setattr(demo, "THIN", wall)
+        found = demo.round_bottle((53, 6), 80)
+        bands.append(found["bands_largest_percent"])
+        assert found["least_wall_over_solid"] == pytest.approx(1, abs=0.01)
+    assert bands[1] / bands[0] == pytest.approx(0.5, abs=0.1) and bands[1] < 1.5
 
 
 @pytest.mark.thorough
