@@ -24,8 +24,8 @@ Predictor: TypeAlias = Callable[[float], Array | None]
 Bend: TypeAlias = tuple[Array, float]
 """Correction of a guess on the tangent: (change of x, locally owned entries; change of the control)."""
 
-_LIMIT_POINT_ITERATIONS = 16
-"""Largest number of states that are solved for to find a limit point."""
+_BY_CUBIC, _BY_HALVES = 8, 12
+"""Largest numbers of states that are solved for to find a limit point: by a cubic, and by halves in turn with it."""
 
 _FLAT = 1e-8
 """Mean displacement over the size of the body below which a body without stiffness is in the reference configuration.
@@ -346,21 +346,19 @@ class Curve:
     def limit_point(self, a: State, b: State) -> State:
         """Return the state of kind "limit point" between two states at which the control is stationary.
 
-        The Hermite cubic gives the guess, and each state found replaces an end. If its slope is more than half of the
-        slope of that end, the path is curved too much for the cubic: the next guess is the middle. This is repeated
-        until the control is within 1e-12 of its extremum, relative, as estimated from slope and curvature. At a kink,
-        as where contact begins, the slope changes its sign without a zero; the ends then enclose the kink.
+        The Hermite cubic gives the guess, and each state found replaces an end. This is repeated until the control is
+        within 1e-12 of its extremum, relative, as estimated from slope and curvature. Where the path is curved too much
+        for the cubic, the ends are halved in every second step until it is within 1e-6.
         """
-        halve = False
-        for _ in range(_LIMIT_POINT_ITERATIONS):
+        for k in range(_BY_CUBIC + _BY_HALVES):
             chord = self.distance(a, b)
-            x, control = self.interpolate(a, b, 0.5 if halve else _stationary(a, b, chord))
+            fraction = _stationary(a, b, chord) if k < _BY_CUBIC or k % 2 else 0.5
+            x, control = self.interpolate(a, b, fraction)
             found = self.solve(x, control, self._plane(a, x, control), "limit point", a)
             curvature = abs(a.slope - b.slope) / chord
-            if found.slope**2 < 2e-12 * curvature * abs(found.control):
+            if found.slope**2 < (2e-12 if k < _BY_CUBIC - 1 else 2e-6) * curvature * abs(found.control):
                 break
-            old, a, b = (a, found, b) if found.slope * a.slope > 0 else (b, a, found)
-            halve = abs(found.slope) > abs(old.slope) / 2
+            a, b = (found, b) if found.slope * a.slope > 0 else (a, found)
         return found
 
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
