@@ -347,8 +347,8 @@ class Curve:
         """Return the state of kind "limit point" between two states at which the control is stationary.
 
         The Hermite cubic gives the guess, and each state found replaces an end. This is repeated until the control is
-        within 1e-12 of its extremum, relative, as estimated from slope and curvature. Where the path is curved too much
-        for the cubic, the ends are halved in every second step until it is within 1e-6.
+        within 1e-12 of its extremum, relative, as estimated from slope and curvature. Where the path is curved so much
+        that the cubic does not come within 1e-6, the ends are halved in every second step.
         """
         for k in range(_BY_CUBIC + _BY_HALVES):
             chord = self.distance(a, b)
@@ -356,7 +356,7 @@ class Curve:
             x, control = self.interpolate(a, b, fraction)
             found = self.solve(x, control, self._plane(a, x, control), "limit point", a)
             curvature = abs(a.slope - b.slope) / chord
-            if found.slope**2 < (2e-12 if k < _BY_CUBIC - 1 else 2e-6) * curvature * abs(found.control):
+            if found.slope**2 < (2e-6 if k == _BY_CUBIC - 1 else 2e-12) * curvature * abs(found.control):
                 break
             a, b = (found, b) if found.slope * a.slope > 0 else (a, found)
         return found
