@@ -375,7 +375,7 @@ def test_gap_closures_cost_few_iterations_and_change_no_state(friction, close, m
     """
     settled = form(cup(friction), 15.0)
     monkeypatch.setattr(Increment, "newly_closed",
-                        property(lambda increment: np.zeros(len(increment.status), dtype=bool)))
+                        property(lambda increment: np.zeros(len(increment.last.status), dtype=bool)))
     plain = form(cup(friction), 15.0)
     assert settled.counts.iterations < 0.8 * plain.counts.iterations
     np.testing.assert_allclose(settled.profile().thickness, plain.profile().thickness, rtol=close)

@@ -41,7 +41,7 @@ def test_a_point_that_is_pulled_along_its_tool_and_hardly_pressed_to_it(inside, 
     tool pulls it out: the state, a root of one equation for its depth, is at the foot of the ramp."""
     C = np.array([[1.0, coupling], [coupling, 1.0]])
     face, free = Face(slip=0.3), np.array([0.1, -0.5 * THETA + inside])
-    f0, S0 = (values[0] for values in face.increment.last_tractions(np.array([0])))
+    f0, S0 = face.increment.last.force[0], face.increment.last.stiffness[0]
     tangent = np.eye(2) + C @ S0                            # that of the body with the law as it was linearised
     contact = SimpleNamespace(faces=[face], unit_forces=lambda chosen: np.eye(2))
     problem = SimpleNamespace(comm=MPI.COMM_SELF, contact=contact)

@@ -12,6 +12,7 @@ from ..forms.transfer import MovingLeastSquares
 from ..mesh.nodes import matching_rows
 from ..physics.contact import Contact
 from ..physics.contact_law import ContactHistory, ContactLaw, Motion, Tractions, symmetric_stiffness
+from ..values.tolerances import NEGLIGIBLE
 from .rule import Gauss, Lobatto, Rule, Vertices
 
 
@@ -60,8 +61,8 @@ class Increment:
 
     * `tractions(x)`, for the residual.
     * `linearise(x)` at the same positions. After it, `tractions(x)` returns the linearised law with its stiffness.
-    * If statuses change, the local contact problem (`LocalSolve`) reads `status`, `newly_closed` and `last_tractions`,
-      predicts tractions by `law_at`, and sets the sense of sliding of the next iteration by `expect`.
+    * If statuses change, the local contact problem (`LocalSolve`) reads `newly_closed` and `last`, predicts tractions
+      by `law_at`, and sets the sense of sliding of the next iteration by `expect`.
 
     Args:
         law: contact law.
@@ -71,6 +72,10 @@ class Increment:
         guessed: mask of the points whose predicted contact forces belong to the guess of the step, shape (n,). The
             first iteration linearises the law at the guess for these points. For the others it extrapolates distances
             and slips from `start`.
+
+    Attributes:
+        last: `Tractions` that were computed last, with the `ContactStatus` of each point and, after `linearise`, the
+            stiffness that it used; None before.
     """
 
     def __init__(self, law: ContactLaw, history: ContactHistory | None, start: np.ndarray | None = None,
@@ -80,8 +85,9 @@ class Increment:
         self._before: Motion | None = None if start is None else law.motion(start, history)   # in the last iteration
         self._guessed = guessed
         self._sense: np.ndarray | None = None               # of sliding in the last iteration
-        self._last: Any = None                              # positions and tractions of the last call
-        self._last_positions = b""                          # those of `_last`
+        self.last: Any = None
+        self._last_x: Any = None                            # positions of `last`, and their bytes
+        self._last_positions = b""
 
     def tractions(self, x: np.ndarray) -> Tractions:
         """Return the tractions at positions x, shape (n, c), length: of the law or, after `linearise(x)`, linearised.
@@ -89,9 +95,9 @@ class Increment:
         They are stored for repeated calls with the same positions.
         """
         positions = x.tobytes()
-        if self._last is None or positions != self._last_positions:
-            self._last, self._last_positions = (x, self._law.tractions(x, self._history)), positions
-        return self._last[1]
+        if self.last is None or positions != self._last_positions:
+            self._last_x, self._last_positions, self.last = x, positions, self._law.tractions(x, self._history)
+        return self.last
 
     def linearise(self, x: np.ndarray) -> np.ndarray:
         """Linearise the law at distances and slips extrapolated from the last iteration to x, shape (n, c), length.
@@ -106,25 +112,16 @@ class Increment:
                 expected = Motion(*[np.where(self._guessed if a.ndim == 1 else self._guessed[:, None], b, a)
                                     for a, b in zip(expected, now)])
             found = self._law.tractions(x, self._history, self._sense, expected)
-            self._last = x, found
+            self._last_x, self.last = x, found
         self._sense, self._before, self._guessed = found.sense, now, None
         return found.force - plain.force
-
-    @property
-    def status(self) -> np.ndarray:
-        """`ContactStatus` of each point (open, sticking, sliding) in the last computed tractions, shape (n,)."""
-        return self._last[1].status
 
     @property
     def newly_closed(self) -> np.ndarray:
         """Mask of the points that are in contact now and were open at the start of the increment, shape (n,)."""
         if self._touched is None:
-            return np.zeros(len(self._last[0]), dtype=bool)
-        return self._law.touching(self._last[0], self._history) & ~self._touched
-
-    def last_tractions(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the tractions, (m, c), stress, and stiffnesses, (m, c, c), that the last `linearise` used."""
-        return self._last[1].force[points], self._last[1].stiffness[points]
+            return np.zeros(len(self._last_x), dtype=bool)
+        return self._law.touching(self._last_x, self._history) & ~self._touched
 
     def law_at(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
         """Return the law at m points, linearised after a further motion y of them: a function of y, (m, c), length.
@@ -133,7 +130,7 @@ class Increment:
         """
         assert self._before is not None
         history = self._history and ContactHistory(*[part[points] for part in self._history])
-        law, x, before = self._law.part(points), self._last[0][points], self._before.part(points)
+        law, x, before = self._law.part(points), self._last_x[points], self._before.part(points)
         return lambda motion: law.tractions(x, history, None, before.to(x + motion))
 
     def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
@@ -143,7 +140,7 @@ class Increment:
         c), length; 0 for points that slide, adhere or have no friction. Sticking points stop at the edge with it.
         """
         assert self._before is not None
-        width, x = 2 * self._law.theta, self._last[0][points]
+        width, x = 2 * self._law.theta, self._last_x[points]
         before = self._before.part(points)
         law = self._law.part(points)
         sticks = np.reshape(law.has_friction and not law.adhesive and law.sticks, (-1, 1))
@@ -155,11 +152,6 @@ class Increment:
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
         """Set the sense of sliding, 1, -1 or 0 (sticking), at masked points, shape (n,) both, for `linearise`."""
         self._sense = np.where(points, sense, 0.0 if self._sense is None else self._sense)
-
-
-_SAME_STIFFNESS = 1e-3
-"""Relative difference of the stiffness of a point below which the stored tangent serves for the next step."""
-
 
 
 class FaceContact:
@@ -324,12 +316,10 @@ class FaceContact:
         return self._of_unknowns(symmetric_stiffness(self.law, x, self.history)), self._of_unknowns(both)[:, ::2, ::2]
 
     def one_sided_change(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the one-sided stiffness of the points minus that in the last tangent, stress/length.
-
-        Shape (n, components, components); 0 for points without a change above 1e-3 of the largest entry.
-        """
+        """Return the one-sided stiffness of the points minus that in the last tangent, stress/length, 0 if negligible.
+        Shape (n, components, components)."""
         change = self._stiffness(fields, control, True) - self._in_tangent
-        least = _SAME_STIFFNESS * np.abs(self._in_tangent).max((1, 2), keepdims=True)
+        least = NEGLIGIBLE * np.abs(self._in_tangent).max((1, 2), keepdims=True)
         return np.where(np.abs(change).max((1, 2), keepdims=True) > least, change, 0.0)
 
     def add_control_derivative(self, values: np.ndarray, fields: np.ndarray, control: float,

@@ -13,6 +13,7 @@ import numpy as np
 from mpi4py import MPI
 
 from ..ranks import combined, gathered
+from ..values.tolerances import NEGLIGIBLE
 from .face import FaceContact
 
 
@@ -37,7 +38,7 @@ class StepLimits:
 
     start_fraction: float = 0.02
     overshoot: float = 1.001
-    negligible_gap: float = 1e-3
+    negligible_gap: float = NEGLIGIBLE
     friction_fraction: float = 0.95
     max_slip_ratio: float = 2e-3
     max_cut_ratio: float = 0.5

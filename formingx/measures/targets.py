@@ -299,7 +299,8 @@ def bind_pole_stretch(problem: Any) -> Quantity:
 
 def bind_volume(problem: Any, form: Any = None) -> Quantity:
     """Return the volume swept by the face under the controlled pressure, length^3, of the whole part."""
-    return WholePartQuantity(_volume(problem, form), problem.scene.symmetry_factor)
+    modelled, images = _volume(problem, form), problem.scene.symmetry_factor
+    return modelled if images == 1 else WholePartQuantity(modelled, images)
 
 
 def _volume(problem: Any, form: Any = None) -> Quantity:

@@ -427,7 +427,7 @@ class Contacts:
 
     @property
     def status(self) -> Any:
-        status = [face.increment.status.tobytes() for face in self.faces]
+        status = [face.increment.last.status.tobytes() for face in self.faces]
         return tuple(map(tuple, listed(self._problem.comm, status))) if status else None
 
     def begin(self, old: Any = None) -> None:

@@ -218,7 +218,7 @@ class LocalSolve:
 
         It is called once after each linearisation.
         """
-        now = [contact.increment.status for contact in self._contacts]
+        now = [contact.increment.last.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.newly_closed for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._status, now):
             mark |= a != b
@@ -318,7 +318,7 @@ class _Points:
         Return the change of dx, locally owned entries, shape (n,), and of step; None if no solution was found.
         """
         y0 = self._gather(self._moved(dx.array_r, step))
-        f0, S0 = self._forces([c.increment.last_tractions(i) for c, i in self._some])
+        f0, S0 = self._forces([(c.increment.last.force[i], c.increment.last.stiffness[i]) for c, i in self._some])
         laws, ramps = [c.increment.law_at(i) for c, i in self._some], list[Any]()
         y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy

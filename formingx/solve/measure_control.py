@@ -85,7 +85,7 @@ class QuantityRun(Run):
             dt = left if left < _STEPS.max_step_ratio * dt else dt
             try:
                 new = self._solve_at(old, event if dt == left else old.time + dt)
-                error = self._error_in_time(new)
+                error = self._error_in_time(new, self._time_error) if self._time_error else 0.0
                 self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, self._limit_before(old, new))]
             except Cutback as cut:

@@ -114,7 +114,8 @@ class Run:
                     if not self.targets.is_open() and state.target is self.targets.until:
                         break
                 self._complete_step()
-                warn_of_branches(record, self.states[len(states) - 1:])
+                if not self.problem.history.path_dependent:
+                    warn_of_branches(record, self.states[len(states) - 1:])
                 if record.ended:
                     break
                 self._progress.show(self.targets.gained(), len(self.states), self.step.length)
@@ -258,7 +259,8 @@ class Run:
         equation = None if end is None else fixed(end)
         if target is not None and quantity is not None:
             equation = quantity.equation(target.value)
-        new = self.curve.step(old, reach, self._predictor, earlier, bend, equation)
+        in_time = self._predictor if smooth and self._time_error else None
+        new = self.curve.step(old, reach, in_time, earlier, bend, equation)
         if target is not None:
             new.kind = "target"
             if not 0 < self.curve.progress(old, new) < 2 * length:
@@ -271,7 +273,8 @@ class Run:
         if self._jumps.rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
         self._orientation.check(old, new)
-        error, variables = self._error_in_time(new), self.problem.history.variables
+        error = self._error_in_time(new, self._time_error) if self._time_error else 0.0
+        variables = self.problem.history.variables
         try:
             if limit and limit.corrections:
                 new = limit.corrections.separate(self.curve, old, new, lambda state: self._jump(state, 0.0))
@@ -287,9 +290,9 @@ class Run:
     def _predictor(self) -> Predictor | None:
         """Function that returns a guess of x at a control, from the polynomial in time through the last states.
 
-        None unless the material relaxes, time passes with the control, and the residual F has no kinks.
+        None unless time passes with the control.
         """
-        if self._time_error is None or not self.problem.setting.rate[-1] or self.problem.contact.faces:
+        if not self.problem.setting.rate[-1]:
             return None
 
         def x(control: float) -> Array | None:
@@ -298,12 +301,10 @@ class Run:
             return predictor.weights(past, time) @ [s.x for s in past] if len(past) > 2 else None
         return x
 
-    def _error_in_time(self, new: State) -> float:
+    def _error_in_time(self, new: State, time_error: TimeError) -> float:
         """Return the time integration error of a step to `new` over its tolerance; raise `Cutback` if it is too large.
         """
-        if self._time_error is None:
-            return 0.0
-        error = self._time_error.ratio(self.states, new.x, new.control)
+        error = time_error.ratio(self.states, new.x, new.control)
         if error > self.settings.max_time_error:
             part = max(0.8 * error ** (-1 / 3), 0.1)
             past = self.states[-1].control

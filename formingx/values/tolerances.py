@@ -25,7 +25,8 @@ It is about the cube root of the relative round-off 1e-16: truncation and round-
 """
 
 NEGLIGIBLE = 1e-3
-"""Part of a length, an area, a force or a mass that findings, checks of states and searches leave out of account."""
+"""Part of a length, an area, a force, a stiffness or a mass that findings, checks of states and steps, and searches
+leave out of account."""
 
 NOTICEABLE = 5e-3
 """Relative error of an integral (volume, energy) of a finished run from which a finding reports it."""
