@@ -206,7 +206,8 @@ def _parts_of_tools(path: Any, states: list[Any], units: Units) -> str:
             rows += [[contact.label, name, words(state.stage) or "run", f"{share:.1%}", page.number(value)]
                      for state, share, value in zip(states, touching, -factor * force @ way)]
     head = ["tool", "part", "end of", "share of the body that touches it", units.label("force", "force on it")]
-    return "<h2>Parts of tools</h2>" + page.table(head, rows) if rows else ""
+    note = "<p class=lead>A part counts together with its images in the planes of symmetry.</p>" if factor > 1 else ""
+    return f"<h2>Parts of tools</h2>{note}{page.table(head, rows)}" if rows else ""
 
 
 def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
