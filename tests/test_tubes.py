@@ -51,15 +51,17 @@ def test_free_inflation_converges_to_membrane_theory():
     assert np.log2(coarse[0] / fine[0]) == pytest.approx(2, abs=0.2)
 
 
-def test_limit_point_is_stationary_where_the_path_is_curved():
-    """A long step passes the limit point, and the path turns within it. Shorter steps have the same maximum."""
-    mesh = fx.mesh.tube(radius=1.0, length=5.0, elements=(27, 8), part="quarter")
-    tube = fx.Scene(mesh=mesh, thickness=0.03, materials=fx.MooneyRivlin(c10=0.4, c01=0.012),
-                    supports=[fx.Clamped("neck"), fx.Clamped("end"), *SYMMETRIES["quarter"]],
+@pytest.mark.parametrize("length, elements, material, volume", [
+    (5.0, (27, 8), fx.MooneyRivlin(c10=0.4, c01=0.012), 37.5),            # the path turns within a long step
+    (6.0, (14, 4), fx.MooneyRivlin(c10=0.3, c01=0.03), 54.0)])            # a long step passes maximum and minimum
+def test_limit_point_is_found_within_a_long_step(length, elements, material, volume):
+    """Shorter steps have the same maximum."""
+    tube = fx.Scene(mesh=fx.mesh.tube(radius=1.0, length=length, elements=elements, part="quarter"), thickness=0.03,
+                    materials=material, supports=[fx.Clamped("neck"), fx.Clamped("end"), *SYMMETRIES["quarter"]],
                     loads=[fx.Pressure("inner")])
-    path = fx.trace(tube, until=fx.enclosed_volume(37.5), progress=False)
+    path = fx.trace(tube, until=fx.enclosed_volume(volume), progress=False)
     (limit,) = path.limit_points
-    shorter = fx.trace(tube, until=fx.enclosed_volume(37.5), progress=False, step=fx.StepControl(largest=0.01))
+    shorter = fx.trace(tube, until=fx.enclosed_volume(volume), progress=False, step=fx.StepControl(largest=0.01))
     assert limit.measures["pressure"] == pytest.approx(shorter["pressure"].max(), rel=1e-6)
 
 

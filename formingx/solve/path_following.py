@@ -272,6 +272,8 @@ class Run:
             raise Cutback(rejection.reason, part) if rejection.fraction else _PassedState(rejection.reason, [])
         if self._jumps.rule == "snap_through" and (new.control - old.control) * self._sense < 0 < old.slope * new.slope:
             raise Failure("the path turns back here", [])
+        if smooth and (new.control - old.control) * old.slope < 0 < old.slope * new.slope:
+            raise Failure("two limit points lie within the step", [])
         self._orientation.check(old, new)
         error = self._error_in_time(new, self._time_error) if self._time_error else 0.0
         variables = self.problem.history.variables
