@@ -83,9 +83,9 @@ class Contact(ScenePart):
             points under tension separate there, for materials that do not relax.
         nodes_per_step: largest number of nodes that come into contact in one step, or their share of the nodes of the
             face, below 1. The results of stick, friction and heat exchange depend on the time of contact. In three
-            dimensions it must be a share; None means 0.01. In a section None means 1 node; an element edge has two.
-            If any face sticks, None means the share 0.05 on each face with stick or friction, in the predicted order of
-            the gap closures. Without stick, friction, bond and heat exchange ten times more nodes come into contact.
+            dimensions None means the share 0.01. In a section None means 1 node; an element edge has two. If any face
+            sticks, None means the share 0.05 on each face with stick or friction, in the predicted order of the gap
+            closures. Without stick, friction, bond and heat exchange ten times more nodes come into contact.
         present_area: True: the penalty refers to area and wall thickness at the beginning of a step, instead of the
             reference configuration. A sheet that is drawn 20 times thinner then penetrates as little as an undeformed
             one. Only without friction. The penetration then depends on the steps.
@@ -140,7 +140,7 @@ class Contact(ScenePart):
         if not self.separates and not three_d and (self.friction_by_temperature or 0 < self.mu < math.inf):
             raise InputError(f"{name}: friction = {friction!r} with separates=False: a point that pulls at the tool has"
                              f" no Coulomb friction; use 'stick' or 'none'")
-        self.nodes_per_step = closures(f"{name}: nodes_per_step", nodes_per_step, three_d)
+        self.nodes_per_step = closures(f"{name}: nodes_per_step", nodes_per_step)
         self.max_closures = self.nodes_per_step or (0.01 if three_d else 1)
         self.points = contact_points(f"{name}: points", points)
         self.present_area = check_type(f"{name}: present_area", present_area, bool, "True or False")

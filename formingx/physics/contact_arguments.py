@@ -33,20 +33,14 @@ def coefficient(name: str, friction: Any) -> Any:
     return non_negative(name, friction)
 
 
-def closures(name: str, nodes: Any, in_space: bool) -> int | float | None:
+def closures(name: str, nodes: Any) -> int | float | None:
     """Return `nodes_per_step`: None, a number of nodes from 1, or a share of the nodes of the face below 1.
 
-    Raise `InputError` for another value, and for a number of nodes in three dimensions.
+    Raise `InputError` for another value.
     """
     if nodes is None:
         return None
-    if positive(name, nodes) < 1:
-        return float(nodes)
-    number = count(name, nodes)
-    if in_space:
-        raise InputError(f"{name} = {nodes!r}: must be a share of the nodes of the face in three dimensions, below 1,"
-                         f" such as {min(number / 100, 0.5):g}")
-    return number
+    return float(nodes) if positive(name, nodes) < 1 else count(name, nodes)
 
 
 def contact_points(name: str, points: Any) -> str | int:
