@@ -112,6 +112,33 @@ def test_restart_in_the_middle(stages, tmp_path):
         assert again[column] == pytest.approx(whole[column], rel=1e-9, abs=1e-14)
 
 
+def test_a_load_that_falls_takes_the_time_of_its_speed():
+    path = run(sheet(), fx.Stage("rise", control="air", until=fx.pressure(0.01), speed=0.005),
+               fx.Stage("fall", control="air", until=fx.pressure(0.002), speed=0.004))
+    ends = [next(s.time for s in reversed(path.states) if s.stage == stage) for stage in ("rise", "fall")]
+    assert ends == pytest.approx([2.0, 4.0], rel=1e-9) and np.diff(path["process_time"]).min() > -1e-12
+
+
+def test_equation_of_a_force_has_its_derivatives():
+    """Of the force on a support that moves at a speed, by the unknowns and by the control, with which time passes."""
+    path = run(block(P1), fx.Stage("load", control="pull", until=fx.travel(0.4), speed=0.1))
+    old, new = path.states[-3:-1]
+    with path.problem.state_context(old) as problem:
+        equation, e, rng = fx.force(-0.5).bind(problem).equation(-0.5), 1e-5, np.random.default_rng(0)
+        x, way, gradient, moved = (problem.x.duplicate() for _ in range(4))
+        x.setArray(new.x[:problem.n_owned])
+        way.setArray(rng.standard_normal(x.getLocalSize()))
+        slope = equation(x, new.control, gradient)[1]
+        along = gradient.dot(way)
+
+        def value(h, control):
+            moved.waxpy(h, way, x)
+            return equation(moved, control, problem.x.duplicate())[0]
+        assert along == pytest.approx((value(e, new.control) - value(-e, new.control)) / (2 * e), rel=1e-6)
+        assert slope == pytest.approx((value(0.0, new.control + e) - value(0.0, new.control - e)) / (2 * e), rel=1e-6)
+    assert abs(slope) > 0.1 and abs(along) > 0.1
+
+
 def test_the_state_of_a_stage_and_a_time():
     body = fx.Scene(mesh=fx.mesh.disc(radius=1.0, thickness=0.1, elements=(4, 1)), materials=P0,
                      supports=[fx.Symmetry("axis"), fx.Clamped("rim")], loads=[fx.Pressure("bottom", name="air")])

@@ -24,8 +24,9 @@ Predictor: TypeAlias = Callable[[float], Array | None]
 Bend: TypeAlias = tuple[Array, float]
 """Correction of a guess on the tangent: (change of x, locally owned entries; change of the control)."""
 
-_BY_CUBIC, _BY_HALVES = 8, 12
-"""Largest numbers of states that are solved for to find a limit point: by a cubic, and by halves in turn with it."""
+_BY_CUBIC = 8
+"""Largest number of states that are solved for to find a limit point by a cubic; twice as many follow, every second at
+half of the interval."""
 
 _FLAT = 1e-8
 """Mean displacement over the size of the body below which a body without stiffness is in the reference configuration.
@@ -350,7 +351,7 @@ class Curve:
         within 1e-12 of its extremum, relative, as estimated from slope and curvature. Where the path is curved so much
         that the cubic does not come within 1e-6, the ends are halved in every second step.
         """
-        for k in range(_BY_CUBIC + _BY_HALVES):
+        for k in range(3 * _BY_CUBIC):
             chord = self.distance(a, b)
             fraction = _stationary(a, b, chord) if k < _BY_CUBIC or k % 2 else 0.5
             x, control = self.interpolate(a, b, fraction)
