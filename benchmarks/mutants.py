@@ -48,7 +48,7 @@ MUTANTS = [Mutant(*row) for row in [
      "contact derivatives"),
     ("contact/step_limit.py", "> 2 * max(self.max_closures, self._predicted_closures) + 2", "> 10**6", "details"),
     ("contact/step_limit.py", "return arc_lengths, start + arc_lengths[:, None] * velocity",
-     "return arc_lengths, start + length * velocity", "contact plugs"),
+     "return arc_lengths, start + length * velocity", "thin_sheets contact_events"),
     ("contact/face.py", "        self._start_at(self.positions(fields, control))", "        pass", "details"),
     ("physics/contact_law.c", "ahead = d - centre", "ahead = 0 * d", "contact plugs"),
     ("physics/contact_law.c", "fabs(trial) > most", "fabs(trial) > 2 * most", "contact plugs"),
@@ -330,7 +330,8 @@ def outcome(mutant: Mutant, tree: Path) -> str:
     before = file.read_text()
     file.write_text(before.replace(mutant.old, mutant.new))
     tests = [f"tests/test_{name}.py" for name in mutant.tests.split()]
-    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-rfE", "-p", "no:cacheprovider", *tests]
+    command = [sys.executable, "-m", "pytest", "-n", "0", "-x", "-rfE", "-p", "no:cacheprovider", "--deselect",
+               "tests/test_details.py::test_every_mutant_stands_in_its_file", *tests]
     try:
         done = subprocess.run(command, cwd=tree, timeout=LIMIT, capture_output=True, text=True, check=False,
                               env=os.environ | {"PYTHONPATH": str(tree)}, start_new_session=True)
