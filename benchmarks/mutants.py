@@ -106,7 +106,7 @@ MUTANTS = [Mutant(*row) for row in [
     ("solve/arc_length.py", "if self.problem.has_inverted_element(self._x, control):", "if False:",
      "details"),
     ("solve/arc_length.py", "share = (length / h) ** 2", "share = -(length / h) ** 2", "treloar stepping limit"),
-    ("solve/arc_length.py", "if found.slope**2 < 2e-12 * curvature * abs(found.control):", "if True:", "treloar limit"),
+    ("solve/arc_length.py", "< (2e-6 if k == _BY_CUBIC - 1 else 2e-12) * curvature", "< (1e6) * curvature", "treloar limit"),
     ("solve/snap_through.py", "self.dissipated += 0.5 * (max(self._sum(self._pull * dx), 0.0) + self._sum(pull * dx))",
      "self.dissipated += self._sum(pull * dx)", "details"),
     ("solve/snap_through.py", "0.5 * (max(self._sum(self._pull * dx), 0.0) +", "0.5 * (self._sum(self._pull * dx) +",
