@@ -259,7 +259,7 @@ def hinged(c10, h, duration):
                    fx.Stage("hold", duration=1.0)]
 
 
-@pytest.mark.parametrize("h, duration", [(0.5, 1.0), (0.2, 0.1)])
+@pytest.mark.parametrize("h, duration", [pytest.param(0.5, 1.0, marks=pytest.mark.thorough), (0.2, 0.1)])
 def test_a_relaxing_sheet_that_is_hinged_has_derivatives(h, duration):
     """Its first states turn by round-off; the derivative is that of whole runs."""
     design = fx.Design(lambda c10, h: hinged(c10, h, duration), {"c10": (0.2, 0.1, 0.4), "h": (h, 0.1, 1.0)})

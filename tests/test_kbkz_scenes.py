@@ -158,7 +158,8 @@ def test_irreversible_damping_does_not_come_back():
     assert true_stress(path, "equibiaxial") == pytest.approx(G * h * (1.3**2 - 1.3**-4), rel=1e-5)
 
 
-@pytest.mark.parametrize("irreversible", [pytest.param(False, marks=pytest.mark.thorough), True])
+@pytest.mark.thorough
+@pytest.mark.parametrize("irreversible", [False, True])
 def test_a_run_continues_from_saved_past_states(irreversible, tmp_path):
     def scene():
         return block(fx.KBKZ(SPECTRUM, DAMPINGS["psm"], shift=fx.WLF(17.44, 51.6, 100.0), irreversible=irreversible),

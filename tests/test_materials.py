@@ -177,7 +177,7 @@ def test_energy_of_ogden_at_changed_volume():
     assert float(rubber.strain_energy(F, **rubber.parameters)(())) == pytest.approx(exact, rel=1e-12)
 
 
-@pytest.mark.parametrize("alpha", [-2.0, 1.3, *(pytest.param(a, marks=pytest.mark.thorough) for a in (2.0, 5.0))])
+@pytest.mark.parametrize("alpha", [1.3, *(pytest.param(a, marks=pytest.mark.thorough) for a in (-2.0, 2.0, 5.0))])
 def test_powers_for_every_perturbation(alpha):
     """Derivatives by all nine entries of F, where two, three or no stretches are equal."""
     mp = pytest.importorskip("mpmath")

@@ -263,8 +263,8 @@ def test_negative_ogden_exponents(alpha):
         assert solid["pressure"] == pytest.approx(mooney["pressure"], rel=1e-9)
 
 
-@pytest.mark.parametrize("material", [MATERIALS[1], fx.Viscoelastic(MATERIALS[0], [(1.0, 1.0)])],
-                         ids=["rubber", "relaxes"])
+@pytest.mark.parametrize("material", [MATERIALS[1], pytest.param(
+    fx.Viscoelastic(MATERIALS[0], [(1.0, 1.0)]), marks=pytest.mark.thorough)], ids=["rubber", "relaxes"])
 @pytest.mark.parametrize("stretch", [0.93, 1.04])
 def test_compressive_resultants_are_reported(material, stretch, caplog, tmp_path):
     """A flat sheet whose rim moves: the resultant over mu h is (1 - l^-6)(c10 + l^2 c01)/(c10 + c01) all over."""

@@ -43,6 +43,7 @@ def test_a_run_does_not_change_its_scene():
     assert np.all(scene.temperature.T.x.array == 150.0)
 
 
+@pytest.mark.thorough
 def test_two_simultaneous_runs_of_a_scene():
     """The temperature of a run belongs to its problem: a second run begins with the temperature of the scene."""
     scene = pressed()

@@ -202,6 +202,7 @@ def test_two_hundred_thousand_triangles():
     assert np.abs(tool.signed_distance(x) - of_ball(x)).max() < 1e-9
 
 
+@pytest.mark.thorough
 def test_points_far_outside_are_outside_of_patches_that_fold(tmp_path):
     """A ribbed mould on a grid of heights: its edges cross the triangles; the sign is that of the flat triangles."""
     sys.path.insert(0, str(ROOT / "demos"))

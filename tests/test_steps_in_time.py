@@ -61,7 +61,8 @@ def test_step_control_is_restored_from_any_state(tmp_path):
 
 CYCLE = np.array([0.0, 1.0, 2.0, 3.0]), np.array([1.0, 2.0, 0.7, 1.5])
 LAWS = [(fx.Viscoelastic, 1e-3), (fx.Viscoelastic, 0.05), (fx.Viscoelastic, 2.0), (fx.TransientNetwork, 1e-3),
-        (fx.TransientNetwork, 0.01), (fx.TransientNetwork, 0.3), (fx.KBKZ, 0.01)]
+        (fx.TransientNetwork, 0.01), (fx.TransientNetwork, 0.3),
+        pytest.param(fx.KBKZ, 0.01, marks=pytest.mark.thorough)]
 
 
 @pytest.mark.parametrize("law, tau", LAWS, ids=lambda x: getattr(x, "__name__", x))
