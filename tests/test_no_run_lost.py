@@ -28,6 +28,7 @@ def relaxing_disc(c10, both, duration):
         fx.Stage("blow", control=below, until=fx.pressure(both + 0.04 * c10), duration=duration)], progress=False)
 
 
+@pytest.mark.thorough
 def test_round_off_between_stages_in_time_dissipates_nothing():
     """Equal pressures on both faces do not deform the disc: the dissipated energy does not depend on them."""
     energies, steps = [], []
