@@ -119,7 +119,7 @@ def test_pressure_on_tools_has_its_derivatives():
         np.testing.assert_allclose(other.array_r, by_control, atol=1e-5 * np.abs(by_control).max())
 
 
-@pytest.mark.parametrize("mu", [0.1, 0.3])
+@pytest.mark.parametrize("mu", [pytest.param(0.1, marks=pytest.mark.thorough), 0.3])
 def test_capstan(mu):
     """The tension T of a sliding strip obeys d ln T / d angle = mu, without the chords at the ends of the arc."""
     path = fx.trace(strip(mu, 0.025, 0.1), until=fx.travel(0.9), progress=False)

@@ -250,7 +250,7 @@ def test_ranks_agree():
         assert other["numbers"] == pytest.approx(serial["numbers"], rel=1e-9)
 
 
-@pytest.mark.parametrize("alpha", [-5.0, -2.0])
+@pytest.mark.parametrize("alpha", [pytest.param(-5.0, marks=pytest.mark.thorough), -2.0])
 def test_negative_ogden_exponents(alpha):
     """The solid with a negative exponent reaches the stretch of the membrane; with -2 it is the pure I2 solid."""
     material = fx.Ogden(mu=-2.0, alpha=alpha)

@@ -72,6 +72,7 @@ def test_no_point_of_the_sheet_lies_inside_a_part(friction):
     assert filling.columns["rib_force"][-1] < 0
 
 
+@pytest.mark.thorough
 def test_report_names_the_parts_of_tools(tmp_path, monkeypatch):
     """The report has a row for each part of a union, with its share of the contact and the force on it."""
     monkeypatch.setattr("formingx.extensions.space.show.view", lambda *arguments: None)

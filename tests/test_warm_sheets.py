@@ -84,6 +84,7 @@ def test_each_point_of_a_column_solidifies_at_its_temperature():
     assert found == pytest.approx(np.broadcast_to(material.fraction(shapes @ T), found.shape), abs=0.01)
 
 
+@pytest.mark.thorough
 def test_relaxation_times_follow_the_depth():
     """A sheet that is hot above and cold below, at small strain: its pressure relaxes as the mean over the column.
 
