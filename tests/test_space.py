@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import ufl
 from conftest import run_json
 from matplotlib.image import imread
 from test_demos import summary
@@ -15,6 +16,7 @@ from formingx import _compat
 from formingx.__main__ import main
 from formingx.extensions.space.lagged_corrections import LaggedCorrections
 from formingx.extensions.space.part import _positive_share
+from formingx.extensions.space.surface import relaxed
 from formingx.io.stl import write_stl
 from formingx.problem.problem import Problem
 from formingx.results.files.fields import Fields
@@ -486,6 +488,19 @@ def on_ball(friction, pressure=0.02):
     return fx.Scene(mesh=sheet, thickness=0.01, materials=fx.NeoHookean(c10=1.0), supports=HELD, loads=[
         fx.Pressure("bottom", value=pressure)], contacts=[fx.Contact("top", fx.tools.revolved(
             fx.tools.sphere(radius=0.5, z=0.0)), friction, direction=(0, 0, -1), name="mould")])
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.4, -1.1])
+def test_relaxed_deformation_keeps_the_direction_of_the_larger_stretch(angle):
+    """A sheet that wrinkles along its larger stretch of 1.5 is in simple tension in this direction."""
+    t, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    F = np.linalg.cholesky(1.5**2 * np.outer(t, t) + 0.6**2 * np.outer(across, across)).T         # upper triangular
+    given = ufl.as_tensor([[F[0, 0], F[0, 1], 0.0], [0.0, F[1, 1], 0.0], [0.0, 0.0, 1 / (1.5 * 0.6)]])
+    U = relaxed(given)
+    found = np.array([[float(U[i, j](())) for j in range(3)] for i in range(3)])
+    l2 = 1.5**-0.5
+    np.testing.assert_allclose(found[:2, :2], 1.5 * np.outer(t, t) + l2 * np.outer(across, across), atol=1e-12)
+    assert found[2, 2] == pytest.approx(l2, rel=1e-12)
 
 
 def test_tray_without_friction():
