@@ -503,6 +503,13 @@ def test_relaxed_deformation_keeps_the_direction_of_the_larger_stretch(angle):
     assert found[2, 2] == pytest.approx(l2, rel=1e-12)
 
 
+def test_a_half_filled_tray_without_friction_does_not_depend_on_steps():
+    """The walls of two runs, one with steps three times as long, agree to 1e-6 at a target."""
+    walls = [fx.trace(tray("none", nodes_per_step=share), until=fx.pressure(0.25), progress=False).wall().ratio
+             for share in (0.01, 0.06)]
+    np.testing.assert_allclose(walls[1], walls[0], rtol=1e-6)
+
+
 def test_tray_without_friction():
     """The tray is filled in less than 250 iterations, and walls do not depend on the number of nodes per step.
 

@@ -12,7 +12,7 @@ import numpy as np
 from ... import figures
 from ... import mesh as meshes
 from ...errors import InputError, check_name
-from ...findings import percent
+from ...findings import coordinates, percent
 from ...forms.probes import probe
 from ...io import csv_files
 from ...mesh import text as grid
@@ -60,12 +60,12 @@ class NodalComparison:
 
     def __str__(self) -> str:
         k = int(np.argmax(self.difference))
-        position, ours, theirs = (", ".join(f"{v:.{digits}g}" for v in row[k]) for row, digits in (
+        position, ours, theirs = (coordinates(row[k], digits) for row, digits in (
             (self.points, 6), (self.ours, 8), (self.theirs, 8)))
         size, reference = self.largest or 1.0, ", ".join(_COORDINATES_OF[self.ours.shape[1]][:self.points.shape[1]])
         return (f"{len(self.nodes)} nodes; our largest displacement is {self.largest:.6g}\n"
                 f"largest difference {self.maximum:.5g} ({percent(self.maximum / size)}), at node {self.nodes[k]},"
-                f" ({reference}) = ({position}): ours ({ours}), theirs ({theirs})\n"
+                f" ({reference}) = {position}: ours {ours}, theirs {theirs}\n"
                 f"root mean square {self.rms:.5g} ({percent(self.rms / size)})")
 
     __repr__ = __str__

@@ -18,6 +18,7 @@ from .passed_tools import PassedTool
 from .solid_tool import Swept
 from .stress import stress_of
 from .surface import smaller_stress
+from .wall import nearest_triangles
 
 _UNBALANCED = 0.02         # share of the resultant of the loads that supports and tools may miss
 
@@ -199,8 +200,7 @@ def slack_part(failure: Any) -> Iterator[Finding]:
     except InputError:                                       # K-BKZ
         return
     wall, forces = stress.wall, stress.resultants
-    node = int(np.argmin(np.linalg.norm(wall.reference_points - worst.position, axis=1)))
-    larger, smaller = forces[(wall.triangles == node).any(1)].T / max(float(forces.max()), 1e-300)
+    larger, smaller = forces[nearest_triangles(wall, worst.position)[1]].T / max(float(forces.max()), 1e-300)
     slack = (larger < _LITTLE_TENSION) & (smaller < _NO_TENSION)
     if slack.any():
         yield Finding("serious", "membrane", f"the sheet is slack at {worst}, where the largest out-of-balance force"

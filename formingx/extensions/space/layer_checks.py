@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from ...findings import Finding, register
+from ...findings import Finding, coordinates, register
 
 
 @register("start")
@@ -30,9 +30,8 @@ def tools_that_reach_the_opposite_layer(body: Any) -> Iterator[Finding]:
         opposite = normals @ contact.travel_vector > 0
         k = int(np.argmax(np.where(opposite, depth - wall, -np.inf)))
         if opposite[k] and depth[k] > wall[k]:
-            place = ", ".join(f"{v:.4g}" for v in points[k])
             yield Finding("warning", repr(contact), f"its travel of {body.format(travel, 'travel')} ends"
                           f" {body.format(float(depth[k]), 'travel', 3)} beyond the opposite layer of the tube at"
-                          f" (x, y, z) = ({place}): a membrane has no contact with itself, and the run ends where the"
-                          f" layers pass through each other. Give the tool a parting plane between the layers"
-                          f" (fx.tools.half), or model one half with Symmetry there, or let it travel less")
+                          f" (x, y, z) = {coordinates(points[k])}: a membrane has no contact with itself, and the run"
+                          f" ends where the layers pass through each other. Give the tool a parting plane between the"
+                          f" layers (fx.tools.half), or model one half with Symmetry there, or let it travel less")

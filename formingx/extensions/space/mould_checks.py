@@ -12,9 +12,9 @@ from ...mesh.nodes import nearest
 from ...physics.contact import Contact
 from ...physics.supports import Symmetry
 from ...scene.contact_checks import OTHER_UNIT
+from .scene_checks import EXTENT_RATIO
 from .triangulated import Triangulated
 
-_SMALL_PUSHER = 9.0        # extent of the sheet over the extent of a tool that moves, from which on it is reported
 _NEAR = 0.1                # of a point to the middle or the rim of a tool, over its largest distance from the middle
 _INSIDE = 0.01             # distance of a held edge inside the mouth of a mould that is reported, over the width
 
@@ -47,7 +47,7 @@ def small_pushers(body: Any) -> Iterator[Finding]:
     whole = float(whole_extent(body.scene).max())
     for contact in body.scene.contacts:
         size = float(np.ptp(contact.tool.bounds, axis=0).max()) if contact.tool.sized else np.inf
-        if contact.direction is not None and size * _SMALL_PUSHER < whole:
+        if contact.direction is not None and size * EXTENT_RATIO < whole:
             yield Finding("warning", repr(contact), f"the tool is {size:.4g} large, the sheet {whole:.4g}: are the"
                           f" units of length the same? If they are, use triangles smaller than the tool where it"
                           f" touches")

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, finite, positive
+from ...findings import coordinates
 from ...results.files.column_table import ColumnTable
 from ...results.numbers import PartNumbers
 from ...scene.symmetry import MirrorPlanes
@@ -63,12 +64,11 @@ class SheetPart(PartNumbers):
     @property
     def rows(self) -> list[tuple[str, str]]:
         """Rows of a table of the formed part, (label, value with its unit), both as text."""
-        deformed, reference = (", ".join(f"{v:.4g}" for v in position) for position in (
-            self.min_wall_at, self.min_wall_reference))
+        deformed, reference = map(coordinates, (self.min_wall_at, self.min_wall_reference))
         axes = "(X, Y)" if len(self.min_wall_reference) == 2 else "(X, Y, Z)"
         holds = [] if self.capacity is None else [
             ("capacity", self._with_unit(self.capacity, self.units.volume))]
-        return self._rows(f"(x, y, z) = ({deformed}), from {axes} = ({reference}), too large by"
+        return self._rows(f"(x, y, z) = {deformed}, from {axes} = {reference}, too large by"
                           f" about {self._length(self.min_wall_error)}", []) + holds + (
             [("in compression, of the sheet", f"{100 * self.wrinkled:.3g} %")] if self.wrinkled else [])
 

@@ -18,7 +18,7 @@ from ...ranks import combined, gathered
 from ...values.tolerances import NEGLIGIBLE
 from .surface_mesh import SurfaceMesh, closest_points
 
-_EXTENT_RATIO = 9.0
+EXTENT_RATIO = 9.0
 """Ratio of the largest extents of tool and sheet, either way, from which their units of length probably differ.
 
 The sheet may be a quarter of the whole.
@@ -214,8 +214,8 @@ def check_contact(scene: Any, contact: Any) -> None:
         raise InputError(f"{contact!r}: points = {contact.points!r}: in three dimensions contact acts at 'nodes'")
     size, length = float(np.ptp(tool.bounds, axis=0).max()), float(max(scene.extent))
     whole = (2 if any(isinstance(support, Symmetry) for support in scene.supports) else 1) * length
-    most = _EXTENT_RATIO if contact.direction is None else _PUSHER_RATIO
-    if tool.sized and np.isfinite(size) and not 1 / _EXTENT_RATIO < whole / size < most:
+    most = EXTENT_RATIO if contact.direction is None else _PUSHER_RATIO
+    if tool.sized and np.isfinite(size) and not 1 / EXTENT_RATIO < whole / size < most:
         raise InputError(f"{contact!r}: the tool is {size:.4g} large, the sheet {whole:.4g}: are the units of length"
                          f" the same (mm, cm, inches)?")
     points = gathered(mesh.comm, mesh.domain.geometry.x)
@@ -238,15 +238,15 @@ def _check_between_nodes(contact: Any, mesh: SurfaceMesh, near: float) -> None:
     if not mesh.flat or not contact.tool.sized:
         return
     points, triangles = mesh.whole()
-    depth = -mesh.faces[contact.on] * _upward(points, triangles) * contact.tool.surface()[0][:, 2]
-    behind = contact.tool.surface()[0][depth > near]
+    corners = contact.tool.surface()[0]
+    behind = corners[-mesh.faces[contact.on] * _upward(points, triangles) * corners[:, 2] > near]
     inside = ((behind[:, :2] > points[:, :2].min(0)) & (behind[:, :2] < points[:, :2].max(0))).all(1)
     behind = behind[inside] * (1, 1, 0)
     behind = behind[:: max(len(behind) // _MOST_COMPARED, 1)]
     on = behind[closest_points(behind, points[triangles])[2] < near]
     if len(on):
-        raise InputError(f"{contact!r}: the sheet starts inside the tool: a part of it, at (x, y) = ({on[0, 0]:.6g},"
-                         f" {on[0, 1]:.6g}), is behind the sheet between its nodes: move the tool (moved)")
+        raise InputError(f"{contact!r}: the sheet starts inside the tool: a part of it, at (x, y) ="
+                         f" {coordinates(on[0, :2], 6)}, is behind the sheet between its nodes: move the tool (moved)")
 
 
 def _upward(points: np.ndarray, triangles: np.ndarray) -> float:

@@ -16,7 +16,7 @@ from .passed_tools import surface_points
 from .solid_tool import Swept
 from .triangulated import Triangulated
 from .union import Union
-from .wall import wall_of
+from .wall import nearest_triangles, wall_of
 
 _FILLET_SHARE = 2e-3       # of the points of a tool over the sheet, from which on a concave fillet is reported
 _RIDGE, _RIDGE_POINTS = 0.02, 41                            # smallest relative size of a ridge; points on a piece
@@ -145,9 +145,8 @@ def stopped_at_a_ridge(failure: Any) -> Iterator[Finding]:
     for contact, travel in zip(tooling.contacts, tooling.travels(last.setting, last.control), strict=True):
         for part, places, advice in () if travel is None else _ridges(contact):
             wall = wall or wall_of(SimpleNamespace(problem=problem), last)
-            node = int(np.argmin(np.linalg.norm(wall.reference_points - worst.position, axis=1)))
-            corners = wall.deformed_points[wall.triangles[(wall.triangles == node).any(1)]]
-            position = wall.deformed_points[node]
+            node, triangles = nearest_triangles(wall, worst.position)
+            corners, position = wall.deformed_points[wall.triangles[triangles]], wall.deformed_points[node]
             relative, on_ridge = position - (travel or 0.0) * contact.travel_vector - part.shift, places - part.shift
             away = relative - on_ridge
             away[:, :2] = np.abs(relative[:2]) - np.abs(on_ridge[:, :2])                   # of the four ridges

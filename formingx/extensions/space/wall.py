@@ -438,6 +438,12 @@ def wall_of(path: Any, state: Any) -> SheetWall:
     return SheetWall(rest[first], moved[first], row.reshape(-1, 3), layers, comm, problem.scene.symmetry_factor)
 
 
+def nearest_triangles(wall: SheetWall, position: np.ndarray) -> tuple[int, np.ndarray]:
+    """Return the node nearest to a reference position, (3,), length, and the mask of its triangles, shape (m,)."""
+    node = int(np.argmin(np.linalg.norm(wall.reference_points - position, axis=1)))
+    return node, (wall.triangles == node).any(1)
+
+
 def _normals(corners: np.ndarray) -> np.ndarray:
     """Return the area vectors of m triangles, shape (m, 3), length^2, for their corners, shape (m, 3, 3)."""
     return np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2

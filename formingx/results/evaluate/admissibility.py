@@ -68,8 +68,8 @@ class Depth(NamedTuple):
     @property
     def words(self) -> str:
         """Depth, tool and position of a contact point in three dimensions, as a sentence without a full stop."""
-        position = ", ".join(f"{v:.5g}" for v in without_round_off(self.place, self.place))
-        return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = ({position})"
+        position = coordinates(without_round_off(self.place, self.place), 5)
+        return f"A contact point is {self.depth:.4g} deep in the tool of {self.name!r} at (x, y, z) = {position}"
 
 
 class AdmissibilityCheck:
