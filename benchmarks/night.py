@@ -3,10 +3,11 @@
     ./fx python3 benchmarks/night.py [WORD ...] [--minutes 9] [--jobs 2] [--again WORD]
 
 Pieces are the demos in full against their stored numbers, each slow test, random calls (`fuzz.py`), random moulds,
-failures (`reliability.py`) and BLAS kernels (`kernels.py`). WORD chooses those whose name contains it. A call returns
-after so many minutes, and prints how many pieces are left; a piece that is under way goes on, and the next call waits
-for it. A piece that ended is not run again, unless `--again` names it. The page is `results/night/page.md`. The exit
-status is 0 if all pieces ended and nothing moved, 1 if something moved, 3 if pieces are left.
+failures (`reliability.py`) and BLAS kernels (`kernels.py`). A slow test of a demo reads what that demo has written.
+WORD chooses the pieces whose names contain it. A call returns after so many minutes, and prints how many pieces are
+left; a piece that is under way goes on, and the next call waits for it. A piece that ended is not run again, unless
+`--again` names it. The page is `results/night/page.md`. The exit status is 0 if all pieces ended and nothing moved, 1
+if something moved, 3 if pieces are left.
 """
 
 from __future__ import annotations
@@ -71,11 +72,12 @@ def file_of(out: Path, name: str) -> Path:
 def run_piece(out: Path, name: str, command: list[str]) -> None:
     """Run a piece, and write its result: whether it failed, what it printed last, the numbers that moved."""
     began, moved, failed, text = time.time(), [], "", ""
+    environment = {**os.environ, "FORMINGX_DEMOS": str(out / "demos")}
     if command:
         with (file_of(out, name).with_suffix(".txt")).open("w+") as printed:
             try:
                 code = subprocess.run(command, cwd=ROOT, stdout=printed, stderr=subprocess.STDOUT, timeout=SECONDS,
-                                      check=False).returncode
+                                      check=False, env=environment).returncode
                 failed = f"ended with {code}" if code else ""
             except subprocess.TimeoutExpired:
                 failed = f"took more than {SECONDS} s"

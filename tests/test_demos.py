@@ -3,6 +3,7 @@
 import json
 import os
 import re
+import shutil
 import signal
 import subprocess
 import sys
@@ -29,8 +30,15 @@ def words(keys):
 
 
 def summary(demo, out, *options, ranks=None, timeout=600):
-    """What a demo writes, under keys that its stored summary has, too."""
-    run(f"demos/{demo}.py", "--out", out, *options, ranks=ranks, timeout=timeout)
+    """What a demo writes, under keys that its stored summary has, too.
+
+    `benchmarks/night.py` has run each demo in full: FORMINGX_DEMOS is the folder of these results.
+    """
+    ended = Path(os.environ.get("FORMINGX_DEMOS", "")) / demo
+    if (ended / "summary.json").exists() and not options and ranks is None:
+        shutil.copytree(ended, out, dirs_exist_ok=True)
+    else:
+        run(f"demos/{demo}.py", "--out", out, *options, ranks=ranks, timeout=timeout)
     found = json.loads((out / "summary.json").read_text())
     assert words(all_demos.numbers(found)) <= words(STORED[demo]) | OPTIONAL
     return found
