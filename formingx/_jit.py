@@ -238,8 +238,8 @@ def compile_c(command: list[str], code: str) -> None:
 
 def _command(jit_options: dict[str, Any]) -> list[str]:
     """Return the words of the command that compiles C from standard input; the name of the library is to be added."""
-    flags = [*shlex.split(sysconfig.get_config_var("CFLAGS") or ""), *shlex.split(os.environ.get("CFLAGS", "")),
-             "-fPIC", "-std=c17", *jit_options["cffi_extra_compile_args"]]
+    flags = [*shlex.split(sysconfig.get_config_var("CFLAGS") or ""), "-fPIC", "-std=c17",
+             *jit_options["cffi_extra_compile_args"], *shlex.split(os.environ.get("CFLAGS", ""))]    # the last one acts
     libraries = [*ffcx_jit._libraries, *(jit_options["cffi_libraries"] or ())]
     return [*(_compiler() or ()), *(flag for flag in flags if not flag.startswith("-W")), f"-I{get_include_path()}",
             "-shared", "-x", "c", "-", *(f"-l{name}" for name in libraries)]

@@ -127,6 +127,13 @@ def test_flags_and_compilers_have_libraries_of_their_own(calls, tmp_path, monkey
     assert len(calls) == len(kept(tmp_path)) == 3
 
 
+def test_flags_of_the_environment_act_last(monkeypatch):
+    monkeypatch.setenv("CFLAGS", "-O0")
+    levels = [flag for flag in _jit._command({"cffi_extra_compile_args": ["-O2"], "cffi_libraries": None})
+              if flag.startswith("-O")]
+    assert levels[-2:] == ["-O2", "-O0"]
+
+
 def test_a_process_waits_for_another_with_the_same_form(calls, tmp_path, monkeypatch, domain):
     area(domain)
     (name,) = kept(tmp_path)
