@@ -48,7 +48,7 @@ def numbers(summary: Any, name: str = "") -> dict[str, Any]:
             found |= numbers(value, f"{name}/{key}".lstrip("/"))
         return found
     wanted = summary is None or isinstance(summary, bool | int | float)
-    return {name: summary} if wanted and not any(word in name.rsplit("/", 1)[-1] for word in TIMES) else {}
+    return {name: summary} if wanted and not any(word in name for word in TIMES) else {}
 
 
 def differs(key: str, old: Any, new: Any, relative: float = RELATIVE) -> bool:
