@@ -160,9 +160,7 @@ def _check(options: argparse.Namespace) -> None:
 
 def _compare(options: argparse.Namespace) -> None:
     """Run the command `compare`: print the differences of two curves, and write a picture and a table of pairs.
-
-    `options` has the files `ours` and `theirs`, their `columns` and `units`, and the folder `out`.
-    """
+    `options` has the files `ours` and `theirs`, their `columns` and `units`, and the folder `out`."""
     comm = MPI.COMM_WORLD
     columns = {our: their or our for our, their in (_pair("--columns", word, False) for word in options.columns)}
     units: dict[str, float | str] = {}
@@ -190,9 +188,7 @@ def _open(options: argparse.Namespace) -> None:
 
 def _states(record: report.ReportData) -> list[str]:
     """Return the lines of a table of states of a recorded run.
-
-    They show limit points, jumps, the last state of each stage, and evenly spaced other states.
-    """
+    They show limit points, jumps, the last state of each stage, and evenly spaced other states."""
     ends = ("process_time", "pressure", "travel", "displacement", "pole_height", "pole_stretch", "contact_length")
     columns = [c for end in ends for c in record.measures if c.endswith(end)][:6]
     n, stages = len(record.kinds), record.stages
@@ -243,9 +239,7 @@ def _watch(options: argparse.Namespace) -> None:
 
 def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
     """Return the two parts of the value OURS=THEIRS of an option; another form is an InputError.
-
-    both: True if both parts are needed; otherwise OURS alone gives (OURS, "").
-    """
+    both: True if both parts are needed; otherwise OURS alone gives (OURS, "")."""
     ours, equals, theirs = word.partition("=")
     if not ours or (equals or both) and not theirs:
         raise InputError(f"{option} {word!r}: must be {'COLUMN=UNIT or COLUMN=FACTOR' if both else 'OURS=THEIRS'}")

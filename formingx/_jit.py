@@ -81,9 +81,7 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
             ) -> dict[str, Any]:
     """Return {name of the library: result of `_load`} of all items; build the missing libraries.
-
-    A failed compiler or loading is a RuntimeError.
-    """
+    A failed compiler or loading is a RuntimeError."""
     ffi = _declarations(np.dtype(form_options["scalar_type"]).name)
     found = {name: _load(ffi, name, item, folder) for name, item in items.items()}
     if not all(found.values()):
@@ -115,9 +113,7 @@ def _load(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
 @functools.cache
 def _declarations(scalar: str) -> cffi.FFI:
     """Return the cffi interface with the declarations of the C structures of FFCx for a scalar type, such as "float64".
-
-    Functions of complex numbers, which cffi cannot declare, take `void *`; Python never calls them.
-    """
+    Functions of complex numbers, which cffi cannot declare, take `void *`; Python never calls them."""
     text = (ffcx_jit.UFC_HEADER_DECL.format(scalar) + ffcx_jit.UFC_INTEGRAL_DECL + ffcx_jit.UFC_FORM_DECL
             + ffcx_jit.UFC_EXPRESSION_DECL)
     ffi = cffi.FFI()
@@ -154,9 +150,7 @@ def _c_code(item: Any, name: str, form_options: dict[str, Any]) -> str:
 
 def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
     """Return the path of a shared library of C functions; compile it if the cache does not contain it.
-
-    No compiler is an InputError, its failure a RuntimeError.
-    """
+    No compiler is an InputError, its failure a RuntimeError."""
     compiler = _compiler()
     if compiler is None:
         raise InputError("formingx compiles its equations, and there is no C compiler: install Debian's packages gcc"

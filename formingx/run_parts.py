@@ -89,10 +89,8 @@ def check_start(state: State, stages: list[Stage], problem: Problem) -> None:
 def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, allow_inadmissible: bool,
              found: list[Finding], timed: bool = False) -> Path:
     """Return a new path that begins with the states of `start`, a path or a state; None: without states.
-
     columns: the argument `record` of `trace`. found: findings of the checks before the run, which are logged. timed:
-    True if the process time is a column.
-    """
+    True if the process time is a column."""
     record = Record(curve.problem, curve)
     record.findings = found
     log_findings(found, curve.problem.comm.rank)
@@ -117,10 +115,8 @@ def write_checkpoints(path: Path, checkpoint: Any, plans: Sequence[Plan] = ()) -
 def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: Any,
                plans: Sequence[Plan] = ()) -> Any:
     """Return the path that a run continues: `start`, or with `resume` the path in the checkpoint, or None.
-
     caller: name of the calling function, for messages. Raise `InputError` if `resume` is given with `start`, or without
-    a checkpoint, or for other stages.
-    """
+    a checkpoint, or for other stages."""
     if not resume:
         return start
     if checkpoint is None or start is not None:
@@ -137,10 +133,8 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
 @contextlib.contextmanager
 def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     """Attach the path, which the yielded function registers and returns, to the errors of a run in a block.
-
     At the end of the block `path.record.hooks.on_end` are called. `ConvergenceError` (without the traceback of the
-    solver), `InputError`, `Interrupted` and errors of a script's functions, such as a material or a column, pass on.
-    """
+    solver), `InputError`, `Interrupted` and errors of a script's functions, such as a material or a column, pass on."""
     paths: list[Path] = []
 
     def register(path: Path) -> Path:

@@ -301,9 +301,7 @@ class Process:
 
     def _check_stages(self, stages: Any) -> list[Stage]:
         """Return the argument `stages` of `run` as a list.
-
-        Raise `InputError` if there is no stage, or if two have the same name.
-        """
+        Raise `InputError` if there is no stage, or if two have the same name."""
         stages = as_list("Process: stages", stages,
                          "stages, such as Stage('vacuum', control=vacuum, until=pressure(1))")
         if not stages:

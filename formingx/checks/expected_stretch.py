@@ -8,9 +8,7 @@ import numpy as np
 
 def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
     """Yield (target or mould as text, stretch) that a flat axisymmetric sheet is expected to reach.
-
-    A target gives the pole stretch of a free spherical cap, a closed mould the square root of the areal draw ratio.
-    """
+    A target gives the pole stretch of a free spherical cap, a closed mould the square root of the areal draw ratio."""
     for face in body.pressurised_faces:
         if not face.flat or not face.axisymmetric:
             continue

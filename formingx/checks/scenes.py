@@ -32,9 +32,7 @@ def _driven(body: SizedBody) -> Iterator[Finding]:
 @register("scene")
 def _edges(body: SizedBody) -> Iterator[Finding]:
     """Report edges without a support of a sheet in three dimensions.
-
-    A flat membrane has no stiffness normal to its plane.
-    """
+    A flat membrane has no stiffness normal to its plane."""
     if body.scene.kinematics.components == 3:
         mesh: Any = body.scene.mesh
         supported = {support.on for support in body.scene.supports}
@@ -61,9 +59,7 @@ def _symmetry(body: SizedBody) -> Iterator[Finding]:
 @register("scene")
 def _hinged_edges(body: SizedBody) -> Iterator[Finding]:
     """Report sharp edges of tools with friction at the edge of a hinged face.
-
-    The face rotates, so its edge leaves the tool, unless it sticks. The direction of the contact is round-off there.
-    """
+    The face rotates, so its edge leaves the tool, unless it sticks. The direction of the contact is round-off there."""
     hinged = [body.scene.mesh.nodes_of(support.on) for support in body.scene.supports
               if isinstance(support, SimplySupported)]
     for contact in body.scene.contacts if hinged else ():

@@ -209,10 +209,8 @@ def method_of_lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable],
 def _finite_volumes(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int,
                     source: Callable | None) -> np.ndarray:
     """Return the temperatures at the nodes of a slab at k times, by finite volumes, shape (k, cells + 1).
-
     Two functions of the face temperature give the fluxes into the faces, power/length^2; the source, power/length^3, is
-    one of position. Times ascend, (k,).
-    """
+    one of position. Times ascend, (k,)."""
     from scipy.integrate import solve_ivp
     from scipy.sparse import diags
     n, dx = cells + 1, slab.thickness / cells

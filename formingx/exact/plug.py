@@ -154,10 +154,8 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
 def _continuation(derivatives: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float,
                   goal: float, radius: float) -> Any:
     """Return the solution of a boundary value problem at a travel by `solve_bvp`, in steps from a smaller travel.
-
     `derivatives` maps (s, y, p) to dy/ds, (3, n), and `ends` (travel, y(0), y(1), p) to residuals. The guess has s
-    (n,), y (3, n) and parameters p; travels are over the radius. A step that fails is an InputError.
-    """
+    (n,), y (3, n) and parameters p; travels are over the radius. A step that fails is an InputError."""
     from scipy.integrate import solve_bvp
     while True:
         found = solve_bvp(derivatives, functools.partial(ends, depth), s, y, p, tol=1e-6, max_nodes=5000)
@@ -278,10 +276,8 @@ def _integrate(length: float, y: np.ndarray, derivatives: Callable, **options: A
 
 def _contact_derivatives(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
     """Return a function of (R, r, z, phi, T1) that gives the derivatives of the five by arc length, in this order.
-
     It holds in contact with edge or side of the plug (`membrane_sliding_over_plug`). Lengths are over the reference
-    radius, tensions over 2 c10 h0; the side has h0 = 0 and an infinite fillet.
-    """
+    radius, tensions over 2 c10 h0; the side has h0 = 0 and an infinite fillet."""
     def derivatives(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)
         half = h0 * R / (l1 * r) / 2                        # half of the thickness

@@ -50,10 +50,8 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
 
 def new_axes() -> Any:
     """Return the axes of a new figure with one plot.
-
     If the script uses `matplotlib.pyplot`, the figure is its current one (`plt.gcf()`); not in a notebook, which shows
-    the returned axes.
-    """
+    the returned axes."""
     pyplot = sys.modules.get("matplotlib.pyplot")
     drawing, axes = figure()
     if pyplot is not None and "ipykernel" not in sys.modules:
@@ -69,9 +67,7 @@ def new_axes() -> Any:
 
 def pyvista() -> Any:
     """Return the module pyvista, imported without `matplotlib.pyplot`, which is slow to import.
-
-    pyvista needs pyplot only for charts; a placeholder module imports pyplot at its first use.
-    """
+    pyvista needs pyplot only for charts; a placeholder module imports pyplot at its first use."""
     name = "matplotlib.pyplot"
     if "pyvista" not in sys.modules and name not in sys.modules:
         sys.modules[name] = _LoadedWhenUsed(name)

@@ -116,6 +116,4 @@ class ConstitutiveHistory(History, Protocol):
 
     def forget_motion(self) -> None:
         """Reset the internal variables that describe the motion in the last step (`Material.motion_variables`).
-
-        The time integration of the next step then assumes no earlier motion.
-        """
+        The time integration of the next step then assumes no earlier motion."""

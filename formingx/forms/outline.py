@@ -66,9 +66,7 @@ class Outline:
 
     def ordered(self, caller: str) -> list[int]:
         """Return the edge numbers in order around the body, counterclockwise.
-
-        Raise `InputError` with the name of the caller if the body has a hole or several parts.
-        """
+        Raise `InputError` with the name of the caller if the body has a hole or several parts."""
         after = {int(a): k for k, (a, _) in enumerate(self.ends)}
         order = [0]
         while len(order) < len(self.ends):
@@ -79,9 +77,7 @@ class Outline:
 
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
         """Divide curved edges (start, end, midpoint), shape (m, 3, 2), length, into straight pieces.
-
-        Return points, shape (n, 2), length, and the end numbers of each piece, shape (m parts, 2).
-        """
+        Return points, shape (n, 2), length, and the end numbers of each piece, shape (m parts, 2)."""
         m, corners = len(edges), int(self.ends.max()) + 1
         points = np.empty((corners + m * (parts - 1), edges.shape[-1]))
         points[self.ends] = edges[:, :2]
@@ -92,9 +88,8 @@ class Outline:
 
     def self_intersection(self, edges: np.ndarray) -> np.ndarray | None:
         """Return a point where deformed edges, shape (m, 3, 2), length, cross, shape (2,), length; else None.
-
-        Crossings of edges with a common neighbour are ignored: an element that bends over a sharp edge makes a crease.
-        """
+        Crossings of edges with a common neighbour are ignored: an element that bends over a sharp edge makes a
+        crease."""
         if crossing_point(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
             return None
         points, pieces = self.pieces(edges, _SEARCH_PIECES)

@@ -100,10 +100,8 @@ class Probe:
 
     def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
         """Return the row of a weighted sum of displacements of points, locally owned entries.
-
         factors: of all n points, shape (n, components). point_weights: shape functions at the m points in cells of this
-        rank, shape (m, dim).
-        """
+        rank, shape (m, dim)."""
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
         triples: list[list] = [[], []]
@@ -124,10 +122,8 @@ class Probe:
 
 class MidSurfaceProbe(Probe):
     """Evaluation of the displacement of a membrane at fixed reference points through its thickness.
-
     Points off the mid-surface stay on the normal of their mid-surface point. Their distance from the mid-surface
-    changes in proportion to the thickness.
-    """
+    changes in proportion to the thickness."""
 
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
@@ -171,9 +167,7 @@ class MidSurfaceProbe(Probe):
 
     def _mean_over_elements(self, values: np.ndarray) -> np.ndarray:
         """Return the mean of a vector over both elements at points where two elements meet, shape (n, 2); collective.
-
-        values: at the ends of elements, in the order of `_ends`, shape (ends, 2).
-        """
+        values: at the ends of elements, in the order of `_ends`, shape (ends, 2)."""
         total = np.zeros((len(self.points), self._components))
         np.add.at(total, self._ends[0], values / 2)
         return self._problem.comm.allreduce(total, MPI.SUM)
@@ -189,9 +183,7 @@ class MidSurfaceProbe(Probe):
 
     def row(self, factors: np.ndarray) -> np.ndarray:
         """Return the row of `Probe.row`, for weights of the displacement on the mid-surface, shape (n, components).
-
-        Raise `InputError` if a point is not on the mid-surface.
-        """
+        Raise `InputError` if a point is not on the mid-surface."""
         middle = self._problem.forms.nearest(self.points)
         outside = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
         if np.any(outside):
@@ -227,9 +219,7 @@ def _normal(tangents: np.ndarray) -> np.ndarray:
 
 def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
     """Return the dim shape functions of an element, or first derivatives on an interval, at m points, shape (m, dim).
-
-    reference: coordinates in the reference cell, shape (m, dimension of the cell).
-    """
+    reference: coordinates in the reference cell, shape (m, dimension of the cell)."""
     if not len(reference):                             # basix does not take an empty set
         return np.zeros((0, element.dim))
     return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)

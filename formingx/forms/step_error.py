@@ -92,9 +92,7 @@ class StepError:
 
     def _stresses_at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
         """Return the stresses of each material at the end of a step, shape (points, 4); x: shape (n,).
-
-        Entries 11, 22, sqrt(2) 12, 33 of the deviatoric Kirchhoff stress.
-        """
+        Entries 11, 22, sqrt(2) 12, 33 of the deviatoric Kirchhoff stress."""
         self._set_time(time)
         self._problem.set_fields(x)
         return [stress.values() for stress in self._stresses]
@@ -107,9 +105,7 @@ class StepError:
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:
         """Update the history variables of the materials to the unknowns x at a process time.
-
-        x: locally owned entries, shape (n,). control: load parameter (control) at this time, dimensionless.
-        """
+        x: locally owned entries, shape (n,). control: load parameter (control) at this time, dimensionless."""
         self._problem.set_fields(x)
         self._set_time(time)
         for history in self._materials:
@@ -117,9 +113,7 @@ class StepError:
 
     def _norm(self, values: list[np.ndarray]) -> float:
         """Return the root mean square of stresses over all quadrature points of all ranks.
-
-        values: stresses of each material, shape (points, 4).
-        """
+        values: stresses of each material, shape (points, 4)."""
         comm = self._problem.comm
         total, number = (combined(comm, v, MPI.SUM)
                          for v in (float(sum(np.sum(v**2) for v in values)), sum(v.shape[0] for v in values)))

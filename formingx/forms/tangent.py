@@ -49,9 +49,7 @@ class ExtendedMatrix:
 
     def constrain(self, bcs: list, rows: list[np.ndarray]) -> None:
         """Set DirichletBCs and rows of the constraint matrix C, owned entries, shape (n,) each, of later tangents.
-
-        Constrained unknowns, and the multipliers of rows that are 0 on all ranks, get unit vectors.
-        """
+        Constrained unknowns, and the multipliers of rows that are 0 on all ranks, get unit vectors."""
         self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]
         self._constrained = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
         for bc in bcs:
@@ -65,9 +63,7 @@ class ExtendedMatrix:
 
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
         """Assemble and return the matrix, with blocks (dofs, shape (n, m), with ghosts; values, shape (n, m, m)) added.
-
-        The m unknowns of a block must share a cell. Entries of constrained unknowns are skipped.
-        """
+        The m unknowns of a block must share a cell. Entries of constrained unknowns are skipped."""
         A, add = self.mat, PETSc.InsertMode.ADD_VALUES
         A.zeroEntries()
         _compat.assemble_matrix(A, self._form, self._bcs)
@@ -87,9 +83,7 @@ class ExtendedMatrix:
 
     def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the sparsity pattern: row pointers and global column numbers of all locally owned rows.
-
-        rows: rows of the constraint matrix C, locally owned entries, shape (n,) each. m: their number.
-        """
+        rows: rows of the constraint matrix C, locally owned entries, shape (n,) each. m: their number."""
         plain = fem_petsc.create_matrix(self._form)
         _compat.assemble_matrix(plain, self._form, self._bcs)
         plain.assemble()
@@ -142,9 +136,7 @@ class Tangent:
 
     def enter(self, active: Any, rate: list[float], changed: bool) -> None:
         """Set the active constraints, and the motion of driven supports, for new step data.
-
-        rate: `StepData.rate`. changed: True if the constraints differ from the current ones.
-        """
+        rate: `StepData.rate`. changed: True if the constraints differ from the current ones."""
         if changed:
             self.matrix.constrain(active.bcs, active.rows)
         if self._lift is not None:
@@ -153,9 +145,7 @@ class Tangent:
 
     def by_control(self, rate: list[float], assemble: Callable[[Any], np.ndarray], n: int) -> np.ndarray:
         """Return dF/dcontrol, shape (n,), through loads, time and driven supports, by rates `StepData.rate`.
-
-        `assemble` maps a compiled linear form to its n locally owned entries.
-        """
+        `assemble` maps a compiled linear form to its n locally owned entries."""
         values = assemble(self._by_load) if self._by_load else np.zeros(n)
         if self._by_time and rate[-1]:
             values += assemble(self._by_time)

@@ -44,9 +44,7 @@ class TemperatureCoefficient:
 
     def update(self, temperatures: Iterable[np.ndarray]) -> None:
         """Update the coefficient to changed temperatures at quadrature points, else raise `InputError`.
-
-        temperatures: for each of `parts`, now and before, shape (1 or 2, cells, q).
-        """
+        temperatures: for each of `parts`, now and before, shape (1 or 2, cells, q)."""
         given = list(temperatures)
         key = self._temperature.time, self._temperature.time_before, *(T.tobytes() for T in given)
         known = self._known.pop(key, None)
@@ -68,10 +66,8 @@ class TemperatureCoefficient:
 
     def _evaluate(self, temperatures: Sequence[np.ndarray]) -> None:
         """Set the coefficient f and its logarithmic rate a, in time, from temperatures.
-
         temperatures: for each group of cells, shape (1 or 2, cells, q): at the last accepted state, then at the state
-        before. With one of them the rate is 0.
-        """
+        before. With one of them the rate is 0."""
         temperature = self._temperature
         for (cells, function), T in zip(self._parts, temperatures, strict=True):
             rows = self._values.function_space.dofmap.list[cells]

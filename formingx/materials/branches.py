@@ -64,10 +64,8 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
 def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return times and stretches of a homogeneous test as arrays, shape (n,) each, checked.
-
     An unknown mode or `between` ("stretch" or "strain"), other shapes, descending times or stretches that are not
-    positive are an InputError.
-    """
+    positive are an InputError."""
     check_name(f"{name}: mode", mode, MODES)
     check_name(f"{name}: between", between, BETWEEN)
     try:

@@ -208,9 +208,7 @@ def stability(response: Response, constants: Any, low: float, high: float) -> Ma
 
 class _Program:
     """Scalar UFL expressions as a list of numpy operations, with common parts evaluated once.
-
-    The inputs are three stretches, then the constants of an energy.
-    """
+    The inputs are three stretches, then the constants of an energy."""
 
     def __init__(self, inputs: list, outputs: list):
         place: dict[Any, int] = {c: i for i, c in enumerate(inputs)}
@@ -238,9 +236,7 @@ class _Program:
 @functools.lru_cache
 def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
     """Return programs of the first, and of the first and second derivatives of W by principal stretches.
-
-    They have 3 and 9 outputs (11, 12, 13, 22, 23, 33 last). W depends on `_STRETCHES` and n `_CONSTANTS`.
-    """
+    They have 3 and 9 outputs (11, 12, 13, 22, 23, 33 last). W depends on `_STRETCHES` and n `_CONSTANTS`."""
     inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
     W = expand_indices(expand_derivatives(W))
     first = [expand_derivatives(ufl.diff(W, x)) for x in _STRETCHES]

@@ -28,10 +28,8 @@ class Peak(NamedTuple):
 
 class FreeInflation:
     """Free inflation of a thin tube or disc of incompressible layers.
-
     Layers are (material, reference thickness in units of length) with constants that are numbers; the radius is the
-    mean of the tube or that of the opening, length.
-    """
+    mean of the tube or that of the opening, length."""
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):
         self._layers = [(material, list(material.parameters.values()), h) for material, h in layers]

@@ -52,9 +52,7 @@ class Quantity:
 
 class WholePartQuantity(Quantity):
     """Output quantity of the whole part, if only a half, a quarter or an eighth of it is modelled (`Scene.symmetry`).
-
-    The quantity of the modelled body is multiplied by `factor`, the number of its images that count.
-    """
+    The quantity of the modelled body is multiplied by `factor`, the number of its images that count."""
 
     def __init__(self, modelled: Quantity, factor: int):
         self._modelled, self._factor = modelled, factor

@@ -49,9 +49,8 @@ class PoleStressRatio:
 
     def evaluate(self) -> float:
         """Return the present Mises stress at the pole over the relaxed one; collective.
-
-        If the relaxed stress is 0, a small equibiaxial strain is added, so an undeformed body has the ratio of moduli.
-        """
+        If the relaxed stress is 0, a small equibiaxial strain is added, so an undeformed body has the ratio of
+        moduli."""
         stored, relaxed, modulus = self._integrals()
         if relaxed < ROUND_OFF * modulus:
             self._strain.value = _ADDED_STRAIN
@@ -61,10 +60,8 @@ class PoleStressRatio:
 
     def _integrals(self) -> np.ndarray:
         """Return the integrals of three stresses over the elements at the pole.
-
-        These are the present Mises stress, the Mises stress after complete relaxation, and the largest shear modulus
-        of the materials. The result has the shape (3,) and is equal on all ranks; collective.
-        """
+        These are the present Mises stress, the Mises stress after complete relaxation, and the largest shear modulus of
+        the materials. The result has the shape (3,) and is equal on all ranks; collective."""
         totals = np.zeros(3)
         for expression, cells in self._parts:
             if len(cells):
@@ -74,11 +71,9 @@ class PoleStressRatio:
 
     def _expression(self, terms: Any) -> fem.Expression:
         """Return the integrands of `_integrals` at quadrature points, as a compiled expression of shape (3,).
-
         They are the present Mises stress, the relaxed Mises stress and the largest shear modulus. Each is multiplied by
         the reference volume of the body per volume of the reference cell. `terms` are the `MaterialTerms` of a
-        material.
-        """
+        material."""
         forms, e = self._problem.forms, self._strain
         F = ufl.variable(forms.elastic_F * ufl.diag(ufl.as_vector([1 + e, 1 - 2 * e, 1 + e])))
         deviators = [ufl.dev(ufl.diff(energy, F) * F.T) for energy in (terms.stored_energy(F),
@@ -117,9 +112,7 @@ class ElasticStretches:
 
     def evaluate(self, cells: int) -> np.ndarray:
         """Return the stretches in the present fields, (cells, n, branches); nan for a missing branch.
-
-        Cells are owned ones, and branches the largest number (`count`).
-        """
+        Cells are owned ones, and branches the largest number (`count`)."""
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:
             if len(own):

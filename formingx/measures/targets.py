@@ -40,9 +40,7 @@ class Amplitude(Quantity):
 
     def _amplitude(self, control: float) -> float:
         """Return this pressure, travel or time over its scale, at a value of the control.
-
-        The scale of the process time and of the control is 1.
-        """
+        The scale of the process time and of the control is 1."""
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -56,9 +54,8 @@ class Amplitude(Quantity):
 
     def equation(self, target):
         """Return the equation, linear in the control, that this quantity equals a target in the user's units.
-
-        It sets a PETSc vector to dc/dx = 0, and returns the dimensionless residual c and its derivative by the control.
-        """
+        It sets a PETSc vector to dc/dx = 0, and returns the dimensionless residual c and its derivative by the
+        control."""
         setting = self._problem.setting
         slope = 1.0 if self._number is None else setting.rate[self._number]
         if self._acts and setting.fading:                    # the load fades, or grows, as the control goes to 1
@@ -147,10 +144,8 @@ def change_completed() -> Target:
 
 def _driven(quantity: str, value: float, of: str | None) -> Target:
     """Return the target that a controlled "pressure" or "travel" reaches a value, stress or length.
-
     `of` names the load, support or tool; None is the only one. Binding raises an InputError if there is none, or
-    several.
-    """
+    several."""
     def bind(problem):
         scene, rate = problem.scene, problem.setting.rate
         found = [i for i, t in enumerate(scene.items)
@@ -305,10 +300,8 @@ def bind_volume(problem: Any, form: Any = None) -> Quantity:
 
 def _volume(problem: Any, form: Any = None) -> Quantity:
     """Return the volume swept by the loaded face of the modelled body as an output quantity.
-
     On a remeshed body it includes the volume that the face swept on earlier meshes. `form` is the integral, the result
-    of `swept_volume`; None to build it.
-    """
+    of `swept_volume`; None to build it."""
     earlier = 0.0
     if problem.scene.state_transfer is not None:
         old, state = problem.scene.state_transfer.before
@@ -353,9 +346,7 @@ def _displacement(problem, points, factors):
 
 def _pole(problem):
     """Return the lowest and the highest Z on the axis, on the first mesh, length.
-
-    A mesh without a boundary "axis" is an InputError.
-    """
+    A mesh without a boundary "axis" is an InputError."""
     mesh = problem.scene.first.mesh
     if "axis" not in mesh.boundaries:
         raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}: elsewhere take"

@@ -105,9 +105,7 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
     """Return the number of elements along the radius of a disc for an accuracy, and the numbers through its layers.
-
-    Layers are {name: function of radii (n,), that returns the thickness (n,), length}, from radius `low` to `high`.
-    """
+    Layers are {name: function of radii (n,), that returns the thickness (n,), length}, from radius `low` to `high`."""
     along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
     thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
@@ -129,9 +127,7 @@ def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coor
 
 def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
     """Return the argument {radius: relative size} `concentrate` of `disc`, checked and sorted by radius.
-
-    A radius that is not on the disc, or a size not between 1e-6 and 1, is an InputError.
-    """
+    A radius that is not on the disc, or a size not between 1e-6 and 1, is an InputError."""
     if not isinstance(concentrate, Mapping) or not concentrate:
         raise InputError(f"disc: concentrate = {concentrate!r}: must be {{reference radius: relative size}}")
     sizes = {}
@@ -350,10 +346,8 @@ def _checked_points(name: str, points: Any) -> np.ndarray:
 def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray, fixed: Any, layers: list[str],
           through: list[np.ndarray], sides: tuple, comm: MPI.Comm) -> Mesh:
     """Return the mesh of quadratic triangles on rows and columns of nodes, with diagonals as on a chessboard.
-
     `place` maps coordinates (k,) to nodes of all rows, (rows, k, 2), length; `ends` of columns (n + 1,) and `fixed`
-    ones (m,) are coordinates. `sides` name first column, last column, first row, last row.
-    """
+    ones (m,) are coordinates. `sides` name first column, last column, first row, last row."""
     points = place(with_middles(ends))
     number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
     triangles, first = {}, 0

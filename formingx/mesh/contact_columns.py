@@ -91,9 +91,7 @@ is hardly stretched there and needs no more elements through it."""
 
 def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_through: bool = False) -> Mesh:
     """Return a mesh of the same body with short columns of elements at the fillets of its tools.
-
-    The mesh itself is returned if the script gave its elements, if it was deformed, or if it is no thin sheet.
-    """
+    The mesh itself is returned if the script gave its elements, if it was deformed, or if it is no thin sheet."""
     preset, columns = mesh.preset, mesh.columns
     if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
         return mesh
@@ -127,10 +125,8 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
 def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[FilletInSheet, bool, np.ndarray]],
                      constrained: list[float], thickness: float, fineness: Fineness) -> tuple[np.ndarray, int]:
     """Return the largest lengths of columns, shape (n,), and the number of elements through the sheet.
-
     They have the fewest unknowns with a small enough estimated error on every fillet, given as (fillet, False for a lip
-    at a constrained end, distances (n,)). s, `size` and thickness are lengths.
-    """
+    at a constrained end, distances (n,)). s, `size` and thickness are lengths."""
     choices, longest = [], s[-1] / fineness.along
     for through in range(1, fineness.max_through + 1):
         errors, lengths, sizes = [0.0], [longest], [size]
@@ -159,10 +155,8 @@ def _sharp_fillet(item: Any, fillet: FilletInSheet, thickness: float, accuracy: 
 
 def is_thick_sheet(mesh: Mesh) -> bool:
     """Return True for a sheet from `disc` or `parison` whose thickness is 1/10 to 1/4 of its length.
-
     The tools that it touches do not choose its elements (`for_contacts`). A thicker body is a block, whose wall is of
-    no interest.
-    """
+    no interest."""
     if mesh.preset is None or mesh.columns is None:
         return False
     ends = mesh.columns.ends

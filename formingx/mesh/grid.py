@@ -95,9 +95,7 @@ def gathered(mesh: Mesh) -> Grid:
 
 def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
     """Return the distributed mesh of the grid that `make` returns on rank 0; collective.
-
-    Invalid elements, or its own InputError, raise an InputError on all ranks, with the name `what`.
-    """
+    Invalid elements, or its own InputError, raise an InputError on all ranks, with the name `what`."""
     error, shape = None, None
     if comm.rank == 0:
         try:
@@ -159,9 +157,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
 
 def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
     """Return {(lower, higher node number of the ends): [node number of the middle]} of all edges of triangles.
-
-    The list is empty for triangles of three nodes.
-    """
+    The list is empty for triangles of three nodes."""
     found: dict[tuple[int, int], list[int]] = {}
     for i, j, k in _EDGES:
         ends = np.sort(triangles[:, [i, j]], axis=1).tolist()
@@ -172,10 +168,8 @@ def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
 def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
                    points: np.ndarray) -> list[list[int]]:
     """Return [first end, last end, middle] of each boundary edge (k, 2), as node numbers; [] if all are foreign.
-
     `known` maps the sorted ends of element edges to [middle]; curves outside, such as tools, give []. Only some in
-    elements is an InputError.
-    """
+    elements is an InputError."""
     pairs = [(int(a), int(b)) for a, b in edges]
     found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in pairs if (min(a, b), max(a, b)) in known]
     if found and len(found) < len(edges):

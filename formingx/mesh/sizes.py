@@ -25,10 +25,8 @@ def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
 
 def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     """Return the ends of columns of elements with given lengths, as coordinates along the sheet, shape (columns + 1,).
-
     Coordinates, lengths s and largest sizes of columns have shape (n,); `fixed` ends, first and last included, must be
-    kept, (m,).
-    """
+    kept, (m,)."""
     number = number_of_columns(s, size)
     marks = np.interp(fixed, coordinates, number)
     ends = [fixed[:1]]

@@ -29,9 +29,7 @@ RAMP_EDGE = 1e-7
 
 class ContactStatus(IntEnum):
     """Status of a contact point: open (FREE), sticking, or sliding.
-
-    SLIDES is sliding along the positive tangent of the tool, SLIDES_BACK along the negative tangent.
-    """
+    SLIDES is sliding along the positive tangent of the tool, SLIDES_BACK along the negative tangent."""
 
     SLIDES_BACK = -1
     STICKS = 0
@@ -559,9 +557,7 @@ class Law(NormalLaw):
     @property
     def friction(self) -> np.ndarray:
         """Ratio of tangential to normal traction at which a point slides, shape () or (n,); infinite for stick.
-
-        With a shear limit that is no constant ratio, it is that of a pressure that tends to 0.
-        """
+        With a shear limit that is no constant ratio, it is that of a pressure that tends to 0."""
         sticks, mu = np.asarray(self.sticks), np.asarray(self.mu)
         if self.shear_limit is not None:
             mu = self.shear_limit(np.zeros(mu.shape), np.where(sticks, 0.0, mu))[1]
@@ -604,10 +600,8 @@ class Law(NormalLaw):
     def _evaluate(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> np.ndarray:
         """Return the output of the C function `tractions` at n positions x, one array of shape (12 n,).
-
         In this order it has the traction vectors (2 n), normal tractions, tangential tractions and senses of sliding (n
-        each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each).
-        """
+        each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each)."""
         near, out = self.nearest(x), np.empty(12 * len(x))
         g = dg = limit = grows = None
         if self.has_friction:
@@ -640,19 +634,15 @@ class Law(NormalLaw):
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and elastic slips at x, shape (n, 2), length, with their gradients, shape (n, 2).
-
-        Slips are 0 without history.
-        """
+        Slips are 0 without history."""
         near = self.nearest(x)
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
     def one_sided_stiffness(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
         """Return the stiffness at an accepted state for the next step, shape (n, 2, 2), stress/length.
-
         A point whose gap just closed (mask `newly_closed`, shape (n,)) has the distance -theta, where the stiffness is
-        0. On the tangent it would slip, so it gets the stiffness at -theta/2.
-        """
+        0. On the tangent it would slip, so it gets the stiffness at -theta/2."""
         near, now = self.nearest(x), self.tractions(x, old)
         # a body may rest at the outer edge of the ramp
         about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * RAMP_EDGE
@@ -666,9 +656,7 @@ class Law(NormalLaw):
 
     def _slip(self, x: np.ndarray, near: Nearest, old: ContactHistory) -> tuple[np.ndarray, np.ndarray]:
         """Return the elastic slip that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
-
-        The result is stored for repeated calls. near: result of `nearest` at x.
-        """
+        The result is stored for repeated calls. near: result of `nearest` at x."""
         if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
             g, dg = np.empty(len(x)), np.empty((len(x), 2))
             _C.elastic_slips(len(x), self.theta, x, near.normal, near.curvature, *old, g, dg)
@@ -678,10 +666,8 @@ class Law(NormalLaw):
 
 def symmetric_stiffness(law: ContactLaw, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
     """Return a symmetric stiffness of points in a section, shape (n, 2, 2), stress/length, for second variations.
-
     It leaves out the coupling of sliding friction to the normal displacement. That has no energy, and its symmetric
-    part would count every such point as an unstable mode.
-    """
+    part would count every such point as an unstable mode."""
     if not law.has_friction:
         return law.tractions(x, old).stiffness
     tangent = law.nearest(x).tangent

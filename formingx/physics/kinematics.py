@@ -297,9 +297,7 @@ def is_block(F):
 
 def in_section_order(F):
     """Return F (UFL, shape (3, 3)) with the axes 2 and 3 exchanged if axis 2 is separate by construction.
-
-    So it is for laws that depend on the direction in a sheet in three dimensions, whose axis 2 is the normal.
-    """
+    So it is for laws that depend on the direction in a sheet in three dimensions, whose axis 2 is the normal."""
     across = ((0, 1), (1, 2), (1, 0), (2, 1))
     if is_block(F) or not all(isinstance(F[place], Zero) for place in across):
         return F

@@ -175,9 +175,7 @@ class Problem:
 
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
         """Set the fields and the control of the forms from a vector of unknowns.
-
-        Return the Lagrange multipliers of the means of boundaries (`ConstrainedMean`), shape (means,), on all ranks.
-        """
+        Return the Lagrange multipliers of the means of boundaries (`ConstrainedMean`), shape (means,), on all ranks."""
         values, last = x.array_r, self.comm.size - 1
         self.set_fields(values, control)
         if not last:
@@ -236,9 +234,7 @@ class Problem:
 
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
         """Return the force of the body on driven support `number`, positive along its component; collective.
-
-        The unit is stress length^2; in plane strain per unit depth, stress length.
-        """
+        The unit is stress length^2; in plane strain per unit depth, stress length."""
         left = self.forces(x, control)[self.driven_unknowns(number)].sum()
         forms = self.forms
         return -float(combined(self.comm, left, MPI.SUM)) * forms.stress * forms.volume / forms.length
@@ -261,9 +257,7 @@ class Problem:
 
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the internal minus external forces, contact included, at the state to which the forms are set.
-
-        fields: its locally owned field unknowns, shape (n,). The forces are dimensionless, shape (n,).
-        """
+        fields: its locally owned field unknowns, shape (n,). The forces are dimensionless, shape (n,)."""
         values = self.assemble(self._residual)
         for contact in self.contact.faces:
             contact.add_residual(values, fields, control)
@@ -316,10 +310,8 @@ class Problem:
     @contextlib.contextmanager
     def state_context(self, state: Any) -> Iterator[Self]:
         """Set the problem to a state inside the context, and restore the previous values at its end.
-
         Step data, history variables, unknowns (`x`, `forms.w`) and control are set. The state has x (locally owned
-        entries), control, time, setting (`StepData` as plain data, or empty) and history_variables.
-        """
+        entries), control, time, setting (`StepData` as plain data, or empty) and history_variables."""
         fields, control, clock = self._fields.copy(), float(self._control), self.forms.clock
         stage, x = self._stage, self.x.array_r.copy()
         variables, predicted = self.history.variables, self.history.predicted
@@ -337,9 +329,7 @@ class Problem:
 
     def restore(self, state: Any) -> None:
         """Restore step data, history variables and process time of an accepted state, to start a step from it.
-
-        `state` has the attributes of `state_context`.
-        """
+        `state` has the attributes of `state_context`."""
         if self.history.path_dependent:
             self.history.variables = state.history_variables
         if state.setting:
@@ -523,10 +513,8 @@ class ProblemHistories:
 
     def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
         """Return the history variables of materials and temperature at the end of a step that is not yet accepted.
-
         They are stored, and `advance` uses them if it accepts the same x, shape (n,). The caller must restore the
-        earlier ones.
-        """
+        earlier ones."""
         self._problem.set_fields(x, control)
         for history in self._forms.histories:
             history.advance(x[: self._problem.n_owned], control, start)

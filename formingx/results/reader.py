@@ -47,9 +47,7 @@ class Reader(Protocol):
 
     def filling(self, contact: FaceContact) -> ColumnTable:
         """Return the remaining gaps between the body and the tool of a contact as a table, one row per state.
-
-        In a section the columns are the controls, such as the pressure, and the gap in each corner of the tool.
-        """
+        In a section the columns are the controls, such as the pressure, and the gap in each corner of the tool."""
 
     def view(self, file: object, state: State, grid: float | None, camera: object) -> None:
         """Draw the body in a state as a PNG file, coloured by its wall over the original thickness.

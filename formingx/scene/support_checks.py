@@ -33,9 +33,7 @@ def check_held(scene: Any, supports: Sequence[Any], touched: bool = False) -> No
 
 def check_axis(scene: Any, supports: Sequence[Any]) -> None:
     """Check that an axisymmetric mesh does not cross the axis R = 0, and that a support constrains u_r on it.
-
-    A violation is an InputError.
-    """
+    A violation is an InputError."""
     if not scene.kinematics.axisymmetric:
         return
     geometry = scene.mesh.domain.geometry
@@ -91,10 +89,8 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
 
 def check_hinges(scene: Any) -> None:
     """Raise an InputError if a layer at a hinge is much softer than another layer at the same rim.
-
     A hinge with weight="area" pulls all layers with one traction, so moduli may differ by a factor of 100. A loaded
-    layer may not be 50 times softer: the pressure would squeeze it out.
-    """
+    layer may not be 50 times softer: the pressure would squeeze it out."""
     moduli = {name: scene.shear_modulus(name) for name in scene.materials}
     for constraint in (constraint for support in scene.supports for constraint in support.constraints()):
         if isinstance(constraint, Constrained):

@@ -9,10 +9,8 @@ from .profile import Nearest
 
 class RigidTool(Protocol):
     """Rigid tool at a travel of 0, such as a `Tool` or a `SolidTool`.
-
     It moves as a rigid body, so the coordinates of points are relative to it. Distances must be exact near the surface:
-    contact multiplies their errors by a penalty of 1e5 times the stiffness of the body.
-    """
+    contact multiplies their errors by a penalty of 1e5 times the stiffness of the body."""
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
         """Return the signed distance of points from the surface of the tool.

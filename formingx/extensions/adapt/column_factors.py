@@ -64,10 +64,8 @@ def _nearest_column(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
 
 def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) -> np.ndarray:
     """Return the required over the present length of the n columns of elements for a limit of rotation, shape (n,).
-
     The limit, in radians, holds for the angle along a column, and on a fillet also for its length over the radius.
-    Middles of the columns have shape (rows of nodes, n, 2), length.
-    """
+    Middles of the columns have shape (rows of nodes, n, 2), length."""
     found = np.full(middles.shape[1], np.inf)
     problem = path.problem
     columns, outline = problem.scene.mesh.columns, Outline(problem.forms)

@@ -114,9 +114,7 @@ class WallObjective:
 
     def shortfall(self, run: DesignRun) -> str:
         """Return a text on the deviation of the best run from the wanted wall, and its reason.
-
-        It is "" if all deviations are below 1 %, or no wall was wanted.
-        """
+        It is "" if all deviations are below 1 %, or no wall was wanted."""
         if self.target_wall is None:
             return ""
         wall = run.wall[self.inside]
@@ -131,9 +129,7 @@ class WallObjective:
 
     def _limits(self, run: DesignRun) -> str:
         """Return a sentence that names the bounds or the prescribed volume that prevent the wanted wall.
-
-        The derivatives of the run predict how much of the deviation would remain without the bounds, or the volume.
-        """
+        The derivatives of the run predict how much of the deviation would remain without the bounds, or the volume."""
         try:
             residual, jacobian = self.residual(run)
         except InputError as error:
@@ -160,9 +156,7 @@ class WallObjective:
 
 class MeasuredWallObjective(WallObjective):
     """Least-squares objective of a search: a measured wall thickness, and possibly a prescribed volume.
-
-    The residuals are the relative deviations of the wall at the measured points of the part.
-    """
+    The residuals are the relative deviations of the wall at the measured points of the part."""
 
     damping = MEASURED_ACCURACY
 
@@ -197,9 +191,7 @@ def _range(wall: np.ndarray) -> str:
 
 def mask_of_range(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
     """Return the mask of nodes of the bottom face in a range of reference lengths, shape (k,).
-
-    With None all nodes count; fewer than two nodes are an InputError.
-    """
+    With None all nodes count; fewer than two nodes are an InputError."""
     s = run.reference_length
     if within is None:
         return np.ones(len(s), dtype=bool)

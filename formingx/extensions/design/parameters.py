@@ -160,9 +160,7 @@ class Parameters:
 
     def vector(self, values: Mapping[str, Any]) -> np.ndarray:
         """Return the vector, shape (n,), for {parameter: number, values at the knots, or `Knots`}.
-
-        Other parameters have their start values. An unknown name or a wrong number of values is an InputError.
-        """
+        Other parameters have their start values. An unknown name or a wrong number of values is an InputError."""
         found, first = self.start.copy(), 0
         for name in values:
             if name not in self._given:

@@ -72,10 +72,8 @@ def fit_shift(fitted: Callable, material: Any, tests: list[Any], temperatures: n
               reference: float, unit: str, terms: int | None, relative: bool, weights: list[float], within: Any
               ) -> ShiftedFit:
     """Fit the constants of a relaxing material and their shift with the temperature.
-
     `fitted` fits at one temperature; tests have temperatures (n,) in "C" or "K"; the kind is "WLF", "Arrhenius" or
-    "table". An unknown shift, or too few temperatures, is an InputError.
-    """
+    "table". An unknown shift, or too few temperatures, is an InputError."""
     from scipy.optimize import minimize
     check_name("fit: shift", kind, SHIFTS)
     law = _law(kind, np.asarray(temperatures, float), reference, unit)
@@ -149,10 +147,7 @@ def _result(base: GeneralisedMaxwell, law: _ShiftLaw, unknowns: np.ndarray, data
 
 
 def _law(kind: str, temperatures: np.ndarray, reference: float, unit: str) -> _ShiftLaw:
-    """Return the shift law of a kind for tests at given temperatures.
-
-    Too few temperatures are an InputError.
-    """
+    """Return the shift law of a kind for tests at given temperatures. Too few temperatures are an InputError."""
     other = sorted({float(T) for T in temperatures if reference != T})
     zero = ABSOLUTE_ZERO[unit]
     if kind == "Arrhenius":
@@ -191,9 +186,7 @@ def _law(kind: str, temperatures: np.ndarray, reference: float, unit: str) -> _S
 
 class _LogTable:
     """Shift aT(T) whose logarithm is a smooth curve through given points, constant beyond them.
-
-    Points are {temperature: log10 aT}.
-    """
+    Points are {temperature: log10 aT}."""
 
     def __init__(self, points: dict[float, float]):
         self._table = Table(points)

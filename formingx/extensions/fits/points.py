@@ -88,9 +88,7 @@ def hint_if_strains(values: np.ndarray) -> str:
 
 def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return stretches and nominal stresses of a test in both in-plane directions, shape (2, n) each, checked.
-
-    A stress that was not measured is nan. An unknown mode, wrong shapes, or inadmissible numbers are an InputError.
-    """
+    A stress that was not measured is nan. An unknown mode, wrong shapes, or inadmissible numbers are an InputError."""
     check_name("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
     biaxial = mode == "biaxial"
     what = "(stretch 1, stretch 2, nominal stress 1, nominal stress 2)" if biaxial else "(stretch, nominal stress)"

@@ -88,10 +88,8 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 @register("scene")
 def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
     """Yield a warning for each constant that is more than twice as large at the lowest temperature as at the highest.
-
     The stress of the stretched part then increases on cooling. Such a part springs back, while a part that solidifies
-    keeps its shape.
-    """
+    keeps its shape."""
     scene = body.scene
     if scene.heat is None:
         return
@@ -118,9 +116,7 @@ def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
 @register("start")
 def implausible_units(body: Any) -> Iterator[Finding]:
     """Yield warnings for temperatures, conductances and diffusivities that no polymer process has; collective.
-
-    A body has from 200 to 680 K, its surroundings at least 200 K, and the Biot number is at most 1e4.
-    """
+    A body has from 200 to 680 K, its surroundings at least 200 K, and the Biot number is at most 1e4."""
     scene = body.scene
     if scene.heat is None:
         return
@@ -194,9 +190,7 @@ def beyond_known_range(body: Any) -> Iterator[Finding]:
 @register("end")
 def passed_known_range(path: Any) -> Iterator[Finding]:
     """Yield a warning for each end of a constant's range that the temperature of the body passed; collective.
-
-    Constants about which a check warned before the run are left out.
-    """
+    Constants about which a check warned before the run are left out."""
     reported = {finding.about for finding in path.record.findings}
     states = path.record.segments[-1].states
     for k, history in enumerate(path.problem.history.parts):
@@ -211,9 +205,7 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
 
 def _outside_known_range(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
     """Yield warnings for constants of materials, friction and expansion that are unknown at `low` or at `high`.
-
-    `cause` is subject and verb of the message, such as "the run brought it".
-    """
+    `cause` is subject and verb of the message, such as "the run brought it"."""
     laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
             for name, value in material.constants().items()]
     laws += [(repr(contact), "friction", contact.mu) for contact in scene.contacts]

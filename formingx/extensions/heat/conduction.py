@@ -117,9 +117,7 @@ class Conduction(HeatVectors):
 
     def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         """Return the rates of heat M dT/dt, with the shapes of `state`, and the heat per time of faces and sources.
-
-        Rates of the body are over its heat capacity, degrees per time; those of tools per contact area.
-        """
+        Rates of the body are over its heat capacity, degrees per time; those of tools per contact area."""
         R = self._body_rate(state[0])
         found, through = [R], []
         for touch, excess in zip(self.tool_contacts, state[1:], strict=True):
@@ -197,9 +195,7 @@ class Conduction(HeatVectors):
     def _end_of_stage(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
                 responses: list[Any]) -> ImplicitStage:
         """Return changes, rates and heats of a converged implicit stage.
-
-        T and its change have shape (n,), degrees; `known` is a temperature state of heats; c is in units of time.
-        """
+        T and its change have shape (n,), degrees; `known` is a temperature state of heats; c is in units of time."""
         R = self._body_rate(T + change)
         changes, rates, through = [change], [R], []
         for touch, response, k in zip(self.tool_contacts, responses, known[1:]):
@@ -218,11 +214,9 @@ class Conduction(HeatVectors):
 
     def _set_deformation(self) -> None:
         """Set the UFL factors by which the deformation enters the forms.
-
         `_weight` is the reference volume per area of the section. `_area` is the deformed area of a face per reference
         length of its line. `_J` is det F. `_gradient_map` is F^-T, which maps Grad T to grad T; None without
-        displacement.
-        """
+        displacement."""
         kinematics, u, X = self._kinematics, self._u, self._X
         self._weight, self._J, self._gradient_map = kinematics.weight(X), self.constant(1.0), None
         self._area = self._weight
@@ -349,9 +343,7 @@ class Conduction(HeatVectors):
 
     def _factorise(self, c: float, responses: list[Any], afresh: bool) -> None:
         """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of rates of heat at the last `T`.
-
-        Tools add their conductance to the diagonal. Factors of the same c are reused unless `afresh`.
-        """
+        Tools add their conductance to the diagonal. Factors of the same c are reused unless `afresh`."""
         if self._factored_for == c and not afresh:
             return
         self._factored_for = c

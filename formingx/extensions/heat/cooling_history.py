@@ -134,9 +134,7 @@ class CoolingHistory:
 
     def _contact_end(self, place: np.ndarray) -> str:
         """Return the end of a contact at a reference position, shape (2,), length, as text; "" if there is none.
-
-        A contact ends there if only some of the three nearest nodes of its face touch the tool.
-        """
+        A contact ends there if only some of the three nearest nodes of its face touch the tool."""
         for touch, contact, _ in self._contacts:
             nodes = gathered(self._problem.comm, np.column_stack([touch.points, touch.conductance > 0]))
             nearest = np.argsort(np.linalg.norm(nodes[:, :2] - place, axis=1))[:3]
@@ -234,10 +232,8 @@ class CoolingHistory:
 
     def ahead(self, time: float, control: float, read: Callable[[], float]) -> float:
         """Return `read()` with the temperatures that the body has at a later time if it stays where the forms are.
-
         control: load parameter (control) of the state to which the forms are set, dimensionless. The present
-        temperatures are restored. At an earlier time the present temperatures are read.
-        """
+        temperatures are restored. At an earlier time the present temperatures are read."""
         if time <= self._time:
             return read()
         present = self._time, self._dt, self._state
@@ -397,9 +393,7 @@ def _set_conductances(body: Any, tool_contacts: Sequence[tuple[Any, Any, np.ndar
 
 def _finer_elements(scene: Any, times: float, duration: float) -> str:
     """Return advice on element sizes that reduce the error `times` (of third order in the size), or "" if unknown.
-
-    `duration` is the time during which heat has penetrated; it gives the depth of the thin elements.
-    """
+    `duration` is the time during which heat has penetrated; it gives the depth of the thin elements."""
     laws = {law.on for law in [*scene.heat.boundaries, *scene.heat.contacts_with_tools(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
     if not faces or len(scene.mesh.layers) > 1:

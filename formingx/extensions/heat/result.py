@@ -339,10 +339,8 @@ class HeatRun:
 
     def _state_at(self, time: float | None) -> list[np.ndarray]:
         """Return the temperatures of body and tools at a time, as an entry of `states`; None: the end of the run.
-
         Between accepted states Hermite's cubic is used, with slopes of parabolas through neighbours. A time outside the
-        run is an InputError.
-        """
+        run is an InputError."""
         times = self._times
         t = times[-1] if time is None else finite("time", time)
         near = 1e-12 * times[-1]
@@ -381,9 +379,7 @@ class HeatRun:
 
     def _first_time_inside(self, excess: Any, times: list[float], from_time: float | None = None) -> float | None:
         """Return the first time at which the function `excess` of time is 0 or negative; None if there is none.
-
-        The sign is examined at `times`, and from `from_time` on; the root between two of them is computed.
-        """
+        The sign is examined at `times`, and from `from_time` on; the root between two of them is computed."""
         from scipy.optimize import brentq
         before = from_time
         for t in times:

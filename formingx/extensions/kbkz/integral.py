@@ -53,9 +53,7 @@ class MemoryIntegral:
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
         """Return the weights w of K past states in the stress for modes of modulus 1, shape (K, modes[, n]).
-
-        Ages in reduced time descend to 0, shape (K,), or (K, n) if they differ between n points.
-        """
+        Ages in reduced time descend to 0, shape (K,), or (K, n) if they differ between n points."""
         x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
         step, young = x[:-1] - x[1:], np.exp(-x[1:])
         mean = _mean_decay(step)
@@ -104,10 +102,8 @@ class MemoryIntegral:
     def inverses_and_damping(self, C: np.ndarray, past: np.ndarray,
                              smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
         """Return Cbar_k^-1 of K past states, shape (K, 4, n), damping h, and dh/dI1 and dh/dI2, shape (K, n) each.
-
         Tensors have the entries 11, 22, 12, 33: C (4, n), `past` (K, 4, n). `smallest_h`, shape (K, n), bounds h; None:
-        no bound.
-        """
+        no bound."""
         inverse = _inverse(past)
         if self.damping is None:
             ones = np.ones((len(past), C.shape[1]))
@@ -123,9 +119,7 @@ class MemoryIntegral:
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
                smallest_h: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the stress S without pressure, shape (4, n), dS/dCbar, shape (4, 4, n), and dS/dt, shape (4, n).
-
-        C has shape (4, n), `past` (K, 4, n), W and its slope by t (K, n) or (K, 1), the bound of damping (K, n).
-        """
+        C has shape (4, n), `past` (K, 4, n), W and its slope by t (K, n) or (K, 1), the bound of damping (K, n)."""
         inverse, h, h1, h2 = self.inverses_and_damping(C, past, smallest_h)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
         if self.damping is None:
@@ -223,10 +217,8 @@ def _quadratic_weight(x: np.ndarray) -> np.ndarray:
 
 
 def _quadratic_weight_slope(x: np.ndarray) -> np.ndarray:
-    """Return the derivative of [x - 2 + (x + 2) e^-x]/x^2 by x.
-
-    x: length of the step over the relaxation time, any shape, as of the result.
-    """
+    """Return the derivative of [x - 2 + (x + 2) e^-x]/x^2 by x. x: length of the step over the relaxation time, any
+    shape, as of the result."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = 1 / 6 - x / 6 + 3 * x**2 / 40 - x**3 / 45 + 5 * x**4 / 1008

@@ -47,9 +47,7 @@ def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> l
 
 def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Merge coincident vertices, shape (n, 3), length, to 1e-7 of the extent, and drop degenerate triangles.
-
-    Return the vertices, shape (k, 3), and the remaining triangles, shape (l, 3).
-    """
+    Return the vertices, shape (k, 3), and the remaining triangles, shape (l, 3)."""
     size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
     _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
     triangles = same.ravel()[triangles]
@@ -59,10 +57,8 @@ def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
     """Return for each body the indices of its k triangles in `triangles`, shape (k,).
-
     A body is a set of triangles, shape (m, 3), connected by edges. At an edge of more than two triangles, only the two
-    with the solid between them are connected.
-    """
+    with the solid between them are connected."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     n, (directed, edges, edge, times) = len(triangles), edges_of(triangles)

@@ -54,10 +54,8 @@ class Borders(NamedTuple):
 
 def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
     """Return unit normals of a smooth surface at the corners of triangles, shape (m, 3, 3).
-
     crease: angle from which an edge is sharp, degrees; 0: flat triangles. It is reduced until no normal tilts from that
-    of its triangle by more than this angle, as beside an edge that is just below it.
-    """
+    of its triangle by more than this angle, as beside an edge that is just below it."""
     facet, limit = unit(area_vectors(points, triangles))[:, None], np.radians(crease)
     i, j = (side % len(triangles) for side in sides_of_edges(triangles))
     turn = turns(facet[:, 0], i, j)
@@ -76,9 +74,7 @@ def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> 
 
 def misfit(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the misfit of normals, shape (m, 3, 3), to smooth edges over the turns there, and its worst place.
-
-    Both are root mean squares, weighted with the areas of the triangles. The place has the shape (3,), length.
-    """
+    Both are root mean squares, weighted with the areas of the triangles. The place has the shape (3,), length."""
     m, area = len(triangles), area_vectors(points, triangles)
     i, j = sides_of_edges(triangles)
     s, k, t, l = i % m, i // m, j % m, j // m
@@ -117,9 +113,7 @@ def corner_groups(points: np.ndarray, triangles: np.ndarray, crease: float) -> n
 
 def _connected(m: int, i: np.ndarray, j: np.ndarray, tips: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the groups of corners that smooth edges connect, shape (m, 3).
-
-    i, j: the two sides of each smooth edge, shape (k,). tips: mask of vertices without connection, shape (n,).
-    """
+    i, j: the two sides of each smooth edge, shape (k,). tips: mask of vertices without connection, shape (n,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     s, k, t, l = i % m, i // m, j % m, j // m
@@ -211,10 +205,8 @@ def flat_directions(points: np.ndarray, triangles: np.ndarray, crease: float
 def _borders(points: np.ndarray, triangles: np.ndarray, facet: np.ndarray, region: np.ndarray, turn: np.ndarray,
              sides: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> Borders:
     """Return some edges between regions, from both sides.
-
     region: of each triangle, shape (m,). turn: angles at k edges, shape (k,), radians. sides: both sides, shape (k,)
-    each. kept: mask, shape (k,).
-    """
+    each. kept: mask, shape (k,)."""
     m, (i, j) = len(triangles), sides
     side, opposite = np.concatenate([i[kept], j[kept]]), np.concatenate([j[kept], i[kept]])
     k, own = side // m, side % m
@@ -235,10 +227,8 @@ def _turn_ahead(borders: Borders, rows: np.ndarray) -> np.ndarray:
 
 def _bends_behind(borders: Borders, ends: Borders, rows: np.ndarray) -> np.ndarray:
     """Return the mask of sharp edges from which their region leads to a curved surface at its far side, shape (k,).
-
     A region between two sharp edges, such as a facet of a cone, has no curvature from one to the other. `borders` are
-    smooth.
-    """
+    smooth."""
     found = np.zeros(len(rows), dtype=bool)
     for near, far in _pairs(ends.region[rows], borders.region):
         behind = (borders.turn[far] > 0) & (
@@ -319,9 +309,7 @@ def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
 
 def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
     """Return a function that solves for a right-hand side, shape (n,), with the MUMPS factors of a matrix.
-
-    It is symmetric positive definite, of scipy in compressed rows.
-    """
+    It is symmetric positive definite, of scipy in compressed rows."""
     from petsc4py import PETSc
     first, columns = (part.astype(PETSc.IntType) for part in (matrix.indptr, matrix.indices))
     A = PETSc.Mat().createAIJ(matrix.shape, csr=(first, columns, matrix.data), comm=PETSc.COMM_SELF)
@@ -344,9 +332,7 @@ def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
 def _equations(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the pairs of groups whose normals satisfy N_a.e + N_b.e = 0, shape (k, 2).
-
-    Also the weights of the equations, shape (k,), and the unit vectors e, shape (k, 3).
-    """
+    Also the weights of the equations, shape (k,), and the unit vectors e, shape (k, 3)."""
     x = np.zeros((int(groups.max()) + 1, 3))
     x[groups.ravel()] = points[triangles.ravel()]
     apex = np.concatenate([groups[:, (i + 2) % 3] for i in range(3)])

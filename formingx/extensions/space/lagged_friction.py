@@ -104,10 +104,8 @@ class LaggedFriction(LaggedStick):
 
     def friction_pressure(self, old: ContactHistory) -> np.ndarray:
         """Return the contact pressure N_0 that limits friction during the next step, shape (n,), stress.
-
         It is the penalty times the depth of `ContactHistory.closure`, at most 10 times larger or smaller than the
-        pressure at the last accepted state.
-        """
+        pressure at the last accepted state."""
         if self._pressure_ahead is None or self._pressure_ahead[0] is not old:
             now, change = np.maximum(old.distance, 0.0), old.closure - old.position
             depth = now
@@ -183,9 +181,7 @@ class LaggedFriction(LaggedStick):
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and normals at x, shape (n, 3), length, for a first-order prediction of distances.
-
-        They are 0 for open points. All slips are 0.
-        """
+        They are 0 for open points. All slips are 0."""
         assert old is not None
         d, n = np.zeros(len(x)), np.zeros_like(x)
         rows, distances = self.contact_distances(x, old)
@@ -194,9 +190,7 @@ class LaggedFriction(LaggedStick):
 
     def _distances(self, x: np.ndarray) -> Distances:
         """Return distances, normals and Hessians at positions x, shape (n, 3), length.
-
-        The last four results are stored, and returned again for the same positions.
-        """
+        The last four results are stored, and returned again for the same positions."""
         for positions, found in self._last:
             if np.array_equal(positions, x):
                 return found
@@ -207,9 +201,7 @@ class LaggedFriction(LaggedStick):
 
 class _Tractions(Tractions):
     """Contact tractions whose `sense` is the direction of sliding as an angle in the tangent plane, radians.
-
-    It is measured from the first vector of `_basis` towards the second, and is 0 for a point that does not slide.
-    """
+    It is measured from the first vector of `_basis` towards the second, and is 0 for a point that does not slide."""
 
     @property
     def status(self) -> np.ndarray:
@@ -219,9 +211,7 @@ class _Tractions(Tractions):
 
 def _basis(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return two orthogonal unit vectors in each tangent plane, shape (n, 3) each; normal: unit normals, shape (n, 3).
-
-    Source: Duff et al., Journal of Computer Graphics Techniques 6 (2017) 1.
-    """
+    Source: Duff et al., Journal of Computer Graphics Techniques 6 (2017) 1."""
     x, y, z = normal.T
     side = np.where(z < 0, -1.0, 1.0)
     a = -1 / (side + z)

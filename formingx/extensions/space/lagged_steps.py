@@ -95,9 +95,7 @@ class LaggedApproach(Approach):
 
     def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """Return True if a new point is deeper in the tool than twice its tributary length.
-
-        old, new: locally owned unknowns, shape (n,).
-        """
+        old, new: locally owned unknowns, shape (n,)."""
         face = self.face
         a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
         deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
@@ -108,10 +106,8 @@ class LaggedApproach(Approach):
 
     def _jumps_over(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """Return True if an open point that does not stick enters the tool in a step, up to its other side.
-
         A point that sticks is held where it entered. Another one would be pushed out where it is nearest to the
-        surface, which must be the side on which it entered. old, new: owned unknowns, shape (n,).
-        """
+        surface, which must be the side on which it entered. old, new: owned unknowns, shape (n,)."""
         face, law = self.face, self.face.law
         if face.contact.sticks or face.history is None:
             return False
@@ -131,9 +127,7 @@ class LaggedApproach(Approach):
 
     def passed(self, fields: np.ndarray, control: float) -> PassedPoint | None:
         """Return the point of the tool that passed the sheet farthest; None if less than is resolved.
-
-        fields: owned unknowns, shape (n,).
-        """
+        fields: owned unknowns, shape (n,)."""
         if self._last is None or self._last[1] != control or not np.array_equal(self._last[0], fields):
             found = self._passed_tool.deepest(fields, control, LAGGED.max_passed_ratio, self._bridged_limit)
             self._last = fields.copy(), control, found
@@ -171,10 +165,8 @@ class LaggedApproach(Approach):
         return LAGGED.settling_iterations if self.has_lagged_friction else 0
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
-        """Open the points in tension; return True if there are any. Collective.
-
-        fields, control: locally owned unknowns, shape (n,), and load parameter of the converged state.
-        """
+        """Open the points in tension; return True if there are any.
+        Collective. fields, control: locally owned unknowns, shape (n,), and load parameter of the converged state."""
         face, variables = self.face, self.face.get()
         if variables is None or not face.contact.separates:
             return False
@@ -195,9 +187,7 @@ class LaggedApproach(Approach):
 
     def _close_penetrated(self, fields: np.ndarray, control: float) -> bool:
         """Close the gaps of open points that penetrate the tool more than is negligible; True if any; collective.
-
-        Each such point sticks or slides from the position where its path in the step met the tool.
-        """
+        Each such point sticks or slides from the position where its path in the step met the tool."""
         face, variables = self.face, self.face.get()
         if variables is None:
             return False
@@ -225,9 +215,7 @@ class LaggedApproach(Approach):
 
     def update_pressure(self, new: np.ndarray, control: float) -> bool:
         """Replace the pressure that bounds lagged friction by that at the end of the step; new: shape (n,).
-
-        False if both agree to `LaggedLimits.max_pressure_difference`, or friction is not lagged.
-        """
+        False if both agree to `LaggedLimits.max_pressure_difference`, or friction is not lagged."""
         if not self.has_lagged_friction:
             return False
         face, law = self.face, self.face.law
@@ -277,10 +265,8 @@ class LaggedApproach(Approach):
 
     def _pressure_difference(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
         """Return the relative difference of two pressures, shape (n,), stress, in the area-weighted 1-norm.
-
         other: None for that of the last accepted state, whose points under pressure count. The sum is divided by their
-        force plus a small one (`LaggedLimits.min_force`).
-        """
+        force plus a small one (`LaggedLimits.min_force`)."""
         face, before = self.face, self.face.law.pressure(self.face.history)
         difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
         sums = np.array([face.rule.area @ np.where(before > 0, difference, 0.0), face.rule.area @ before])

@@ -72,10 +72,8 @@ def narrow_sheets(body: Any) -> Iterator[Finding]:
 @register("start")
 def narrow_moulds(body: Any) -> Iterator[Finding]:
     """Yield a finding for a face of the sheet with moulds past whose end it hangs, if a pressure is too large for it.
-
     The overhang bears about as much as a disc. Its radius is the largest distance of a node without a tool straight
-    ahead from nodes with one, and from the edges that are held.
-    """
+    ahead from nodes with one, and from the edges that are held."""
     scene = body.scene
     pressures = body.pressures() if scene.kinematics.components == 3 else []
     if not pressures or any(material.varies for material in scene.materials.values()):

@@ -42,9 +42,7 @@ def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def sides_of_edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the two sides of each edge of exactly two triangles, shape (k,) each.
-
-    Side k m + t is the edge of triangle t (of m) from its corner k to the next.
-    """
+    Side k m + t is the edge of triangle t (of m) from its corner k to the next."""
     _, _, number, times = edges_of(triangles)
     order, starts = np.argsort(number, kind="stable"), np.concatenate([[0], np.cumsum(times)])
     two = np.flatnonzero(times == 2)
@@ -97,18 +95,14 @@ class PatchSurface:
 
     def positions(self, triangles: np.ndarray, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return points of the surface and its unit normals, out of the tool, shape (n, 3) each.
-
-        coordinates: barycentric, for the first two corners, shape (n, 2).
-        """
+        coordinates: barycentric, for the first two corners, shape (n, 2)."""
         out = np.empty((len(triangles), 6, 3))
         _C.evaluate(len(triangles), triangles, self.patches, coordinates, out)
         return out[:, 0], unit(np.cross(out[:, 1], out[:, 2]))
 
     def _nearest(self, x: np.ndarray, derivatives: bool) -> tuple[Distances, np.ndarray]:
         """Return the distances of points, shape (n, 3), length, and the nearest triangles, shape (n,).
-
-        derivatives: False to leave normals and Hessians empty.
-        """
+        derivatives: False to leave normals and Hessians empty."""
         n = len(x)
         d, normal, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
         guess = self._guesses.pop(n, None)
@@ -144,9 +138,7 @@ class PatchSurface:
 
 def _neighbours(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return the normals of the neighbour across each edge at the two ends of the edge, shape (m, 3, 2, 3).
-
-    Without exactly two triangles at an edge, they are those of the triangle itself.
-    """
+    Without exactly two triangles at an edge, they are those of the triangle itself."""
     m = len(triangles)
     other = np.stack([np.stack([normals[:, k], normals[:, (k + 1) % 3]], 1) for k in range(3)], 1)
     i, j = sides_of_edges(triangles)
@@ -170,9 +162,7 @@ def _bulges(patches: np.ndarray, facet: np.ndarray) -> np.ndarray:
 
 def _end_tangent(chord: np.ndarray, normal: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the direction of the boundary curve at an end of each of m edges, shape (m, 3).
-
-    It lies in the tangent plane, along a crease in that of the neighbour too. chord: length.
-    """
+    It lies in the tangent plane, along a crease in that of the neighbour too. chord: length."""
     inside = unit(chord - (chord * normal).sum(1, keepdims=True) * normal)
     along = np.cross(normal, other)
     size = np.linalg.norm(along, axis=1, keepdims=True)

@@ -66,9 +66,7 @@ class PressureOnTools:
 
     def work(self, value: Any, area: Any, control: Any) -> Any:
         """Return the virtual work (UFL) that a pressure does in excess of p a n/3, to subtract from the residual.
-
-        value: pressure (UFL). area: deformed area vector per unit reference area (UFL, shape (3,)). control: UFL.
-        """
+        value: pressure (UFL). area: deformed area vector per unit reference area (UFL, shape (3,)). control: UFL."""
         surface, v = self._surface, self._surface.test_displacement()
         displacement, normal, motion, *hessian = (ufl.split(f)[0] for f in (
             self._displacement, self._normal, self._motion, *self._hessian))
@@ -128,9 +126,7 @@ class PressureOnTools:
 
     def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the forces of the pressure on the tool of one face near its m points, shape (m, 3), stress length^2.
-
-        fields: owned unknowns, shape (n,). Collective.
-        """
+        fields: owned unknowns, shape (n,). Collective."""
         surface = self._surface
         w, before, earlier = surface.w.x, surface.w.x.array.copy(), float(surface.control.value)
         w.array[:len(fields)], surface.control.value = fields, control

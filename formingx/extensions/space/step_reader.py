@@ -50,9 +50,7 @@ def read_step(name: str, size: float | None, angle: float) -> tuple[np.ndarray, 
 
 def _body(gmsh: Any, entity: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices, triangles and normals of a meshed solid (dimension, tag), as `read_step`.
-
-    gmsh is asked for normals at the parameters of its own nodes: it may find other parameters for a given point.
-    """
+    gmsh is asked for normals at the parameters of its own nodes: it may find other parameters for a given point."""
     tags, X, _ = gmsh.model.mesh.getNodes()
     row = np.zeros(int(tags.max()) + 1, dtype=int)
     row[tags.astype(int)] = np.arange(len(tags))
@@ -80,9 +78,7 @@ def _body(gmsh: Any, entity: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, n
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
     """Return the mask of the triangles to turn, so that all are oriented like their neighbours, shape (m,).
-
-    Each triangle has two nodes in a graph, as it is and turned. Two neighbours are connected as they fit.
-    """
+    Each triangle has two nodes in a graph, as it is and turned. Two neighbours are connected as they fit."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     m = len(triangles)

@@ -75,9 +75,8 @@ class Surface(Formulation):
 
     def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray | float:
         """Return the forces of pressures on a tool between the m contact points of a face, shape (m, 3).
-
-        They are 0 without a pressure on a sheet that slides. fields: owned unknowns, shape (n,). Unit: stress length^2.
-        """
+        They are 0 without a pressure on a sheet that slides. fields: owned unknowns, shape (n,). Unit: stress
+        length^2."""
         return 0.0 if self._on_tools is None else self._on_tools.carried_forces(face, fields, control)
 
     def _residual(self, body: Any) -> tuple[Any, Any, Any]:
@@ -181,9 +180,7 @@ class Surface(Formulation):
 
     def temperatures(self, terms: Any) -> np.ndarray:
         """Return the temperatures at the quadrature points of `terms`, now and before, shape (1 or 2, cells, q).
-
-        If the mean of the constants will do, the temperatures of the m points of a column follow in a fourth index.
-        """
+        If the mean of the constants will do, the temperatures of the m points of a column follow in a fourth index."""
         if self._columns is None:
             return super().temperatures(terms)
         layer, n = self._columns.layers[terms.names[0]], self.energy_depths
@@ -214,9 +211,7 @@ class Surface(Formulation):
 
     def _deformation_gradient(self) -> Any:
         """Return F of the incompressible membrane, rotated to upper triangular form (UFL, shape (3, 3)).
-
-        Its axes: along the deformed first edge, across it in the surface, and along the normal.
-        """
+        Its axes: along the deformed first edge, across it in the surface, and along the normal."""
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         f1, f2 = (F * t for t in self._axes[:2])
         n = ufl.cross(f1, f2)
@@ -225,16 +220,12 @@ class Surface(Formulation):
 
     def law_axes(self, material: Any, names: list[str]) -> Callable:
         """Return the function that refers F to directions of the surface, for an energy that depends on the direction.
-
-        The energies of other materials take F in the axes of each triangle.
-        """
+        The energies of other materials take F in the axes of each triangle."""
         return self._in_directions if depends_on_direction(self.scene, names[0]) else super().law_axes(material, names)
 
     def _in_directions(self, F: Any) -> Any:
         """Return an F of the axes of each triangle, referred to a first direction in the surface, normal and a second.
-
-        Its rows are the deformed first axis, the normal and the other axis (UFL, shape (3, 3)).
-        """
+        Its rows are the deformed first axis, the normal and the other axis (UFL, shape (3, 3))."""
         t1, t2, normal = self._axes
         d1, d2 = self._directions
         side = ufl.inner(normal, ufl.cross(d1, d2))          # -1 keeps det F positive
@@ -299,10 +290,8 @@ class Surface(Formulation):
 
 
 class _AlwaysAdmissible:
-    """Check of the volume ratio that every state passes, for membranes, whose volume ratio J is always above 0.
-
-    It takes the place of `Admissible`, the check for solids.
-    """
+    """Check of the volume ratio that every state passes, for membranes, whose volume ratio J is always above 0. It
+    takes the place of `Admissible`, the check for solids."""
 
     def holds(self) -> bool:
         """Return True: the volume ratio of a membrane is positive in every state."""

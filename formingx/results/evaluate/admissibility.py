@@ -197,9 +197,7 @@ class AdmissibilityCheck:
 
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
         """Yield for each tool in three dimensions the deepest contact point, if it is deeper than allowed; collective.
-
-        `allowed` returns the limit of a `FaceContact` for its n contact points, shape (n,) or a number, length.
-        """
+        `allowed` returns the limit of a `FaceContact` for its n contact points, shape (n,) or a number, length."""
         if self._problem.scene.kinematics.components < 3:
             return
         with self._problem.state_context(state) as problem:
@@ -214,10 +212,8 @@ class AdmissibilityCheck:
 
     def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield for each tool the edge with the largest penetration over wall, if it exceeds the limit.
-
         Edges have shape (m, 3, 2), lengths (m,). The penetration is the largest one of three nodes; contact points must
-        be nodes.
-        """
+        be nodes."""
         weight, reference = self._problem.scene.kinematics.weight, self._outline.reference_edges
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.active or contact.contact.points != "nodes" or not face.any():

@@ -67,9 +67,7 @@ class Tension:
 
     def smallest(self, state: Any) -> Resultant:
         """Return the smallest meridional or hoop resultant at the quadrature points in a state; collective.
-
-        Compression is negative. In plane strain the resultants out of plane are not examined.
-        """
+        Compression is negative. In plane strain the resultants out of plane are not examined."""
         values = self._values(state)
         n = 2 if self._problem.scene.kinematics.axisymmetric else 1
         k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))
@@ -83,10 +81,8 @@ class Tension:
 
     def _values(self, state: Any) -> np.ndarray:
         """Return data at the n quadrature points of all ranks in a state, shape (n, 5); collective.
-
         The columns are the meridional and the hoop resultant over shear modulus times thickness, R and Z (length), and
-        the hoop force per reference length of the meridian (stress * length).
-        """
+        the hoop force per reference length of the meridian (stress * length)."""
         problem, domain = self._problem, self._problem.forms.domain
         with problem.state_context(state):
             cells = own_cells(domain)
@@ -96,9 +92,7 @@ class Tension:
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:
     """Return the number of the first state in which a membrane in a section is compressed, and its resultant.
-
-    The smallest resultant is meant; None without compression or without a membrane. Collective.
-    """
+    The smallest resultant is meant; None without compression or without a membrane. Collective."""
     k = 0
     for segment in path.record.segments:
         scene = segment.problem.scene

@@ -19,9 +19,7 @@ _MAX_VOLUME_RATIO = 2.0
 
 def findings(error: float, where: str, far_error: float | None = None) -> list[Finding]:
     """Return a finding in a list if the root mean square of J - 1 exceeds 0.005 in a state; else an empty list.
-
-    Above 0.02 it is a warning, unless `far_error`, away from clamped faces, is small; `where` names the state.
-    """
+    Above 0.02 it is a warning, unless `far_error`, away from clamped faces, is small; `where` names the state."""
     if error <= NOTICEABLE:
         return []
     if far_error is not None and far_error <= 4 * NOTICEABLE:

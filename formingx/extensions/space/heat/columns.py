@@ -107,9 +107,7 @@ class ColumnConduction:
 
     def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         """Return the rates of heat M dT/dt, with the shapes of `state`, and the heat per time of laws and tools.
-
-        Rates of the columns are over `capacity`, degrees per time; those of tools per contact area.
-        """
+        Rates of the columns are over `capacity`, degrees per time; those of tools per contact area."""
         T, found, through = state[0], [], []
         fluxes = [law.flux(T[:, law.point])[0] for law in self._laws]
         R = self._rate(T, fluxes)
