@@ -23,14 +23,8 @@ The header of THEIRS names its columns and may state units: pressure [psi]."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run a command of `python3 -m formingx`.
-
-    Args:
-        arguments: words of the command line after `formingx`; None: the words of this process.
-
-    Returns:
-        Exit status of the process: 0, or 2 for an argument that is not allowed.
-    """
+    """Run the command of `python3 -m formingx` with some words, None: those of this process.
+    Return the exit status: 0, or 2 for an argument that is not allowed."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         if words[:1] == ["demo"]:
@@ -127,12 +121,7 @@ def _demos() -> dict[str, str]:
 
 def _demo(words: list[str]) -> None:
     """Run a demo in this process, like `python demos/NAME.py OPTIONS`, also under mpirun.
-
-    words: name of the demo and its options.
-
-    Raises:
-        InputError: there is no such demo.
-    """
+    words: its name and its options."""
     demos = _demos()
     listed = ", ".join(demos) or f"none; {os.fspath(_folder())} holds no demo"
     if not words:
@@ -211,11 +200,7 @@ def _report(options: argparse.Namespace) -> None:
 
 
 def _units(given: str | None) -> Units:
-    """Return the units of the value of the option --units, such as mm,MPa; for None units without names.
-
-    Raises:
-        InputError: the option has another form.
-    """
+    """Return the units of the value of the option --units, such as mm,MPa; for None units without names."""
     if given is None:
         return NONE
     length, comma, stress = given.partition(",")

@@ -5,12 +5,8 @@ from typing import Any
 
 
 class OneLine:
-    """A `sys.excepthook` that prints an uncaught error of one type as one line, and others as the hook before it.
-
-    Args:
-        kind: type of the error.
-        text: the line; "" for the message of the error.
-    """
+    """A `sys.excepthook` that prints an uncaught error of type `kind` as one line, and others as the hook before it.
+    The line is `text`, or the message of the error if that is ""."""
 
     def __init__(self, kind: type[BaseException], text: str = ""):
         self._kind, self._text, self._usual = kind, text, sys.excepthook

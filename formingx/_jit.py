@@ -57,12 +57,8 @@ def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) ->
 def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
                      ) -> dict[str, tuple[Any, Any, tuple]]:
     """Return compiled forms and expressions; rank 0 builds all missing ones as one library.
-
-    Collective.
-
-    Items are {name by `key`: UFL form, or (expression, points)}, results {name: (object of FFCx, namespace, (None,
-    None))}. A failed compiler, or an item refused on rank 0, is a RuntimeError.
-    """
+    Collective. Items are {name by `key`: UFL form, or (expression, points)}, results {name: (object of FFCx, namespace,
+    (None, None))}. A failed compiler, or an item refused on rank 0, is a RuntimeError."""
     folder = Path(jit_options["cache_dir"]) / "formingx"
     if comm.rank == 0:
         try:
@@ -171,13 +167,8 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
 
 class CFunctions:
     """Functions of a C file of the package, as attributes; the file is compiled when one is first used.
-
     An argument is a number, an array, or None for no array. An array is copied if it is not contiguous or of another
-    type, except where C writes into it: there it must be contiguous, of floats or of integers (long in C).
-
-    Args:
-        file: path of the C file within the package. Files that it includes by "..." belong to the package, too.
-    """
+    type, except where C writes into it: there it must be contiguous, of floats or of integers (long in C)."""
 
     def __init__(self, file: str):
         self._file = Path(__file__).parent / file
@@ -275,11 +266,8 @@ def _temporary_folder() -> tempfile.TemporaryDirectory:
 
 @contextlib.contextmanager
 def _locked(folder: Path, name: str) -> Iterator[None]:
-    """Lock the build of the form `name` in a folder within a block.
-
-    A second process waits, and then finds the library of the first. The lock ends with its process. On a file
-    system without locks both processes build.
-    """
+    """Lock the build of the form `name` in a folder within a block; a second process waits, then finds the library.
+    The lock ends with its process. On a file system without locks both processes build."""
     import fcntl
     file = folder / f"{name}.lock"
     with open(file, "w") as lock:

@@ -70,15 +70,7 @@ class Interrupted(KeyboardInterrupt):
 
 
 def positive(name: str, value: Any) -> float:
-    """Return an argument that must be a positive number as a float.
-
-    Args:
-        name: name of the argument, for the error message.
-        value: the argument.
-
-    Raises:
-        InputError: the argument is not finite, or not above 0.
-    """
+    """Return an argument as a float; InputError, with the argument's name, unless it is finite and above 0."""
     number = finite(name, value)
     if number <= 0:
         raise InputError(f"{name} = {value!r}: must be greater than 0")
@@ -86,15 +78,7 @@ def positive(name: str, value: Any) -> float:
 
 
 def non_negative(name: str, value: Any) -> float:
-    """Return an argument that must be a number of 0 or more as a float.
-
-    Args:
-        name: name of the argument, for the error message.
-        value: the argument.
-
-    Raises:
-        InputError: the argument is not finite, or below 0.
-    """
+    """Return an argument as a float; InputError, with the argument's name, unless it is finite and 0 or more."""
     number = finite(name, value)
     if number < 0:
         raise InputError(f"{name} = {value!r}: must not be negative")
@@ -227,16 +211,7 @@ def file_path(name: str, value: Any) -> Path:
 
 
 def check_name(kind: str, name: Any, names: Any) -> None:
-    """Check that a name is one of the known names.
-
-    Args:
-        kind: kind of the name, such as "Scene: layer", for the message.
-        name: the name.
-        names: the known names.
-
-    Raises:
-        InputError: the name is unknown; the message lists the known names.
-    """
+    """Raise an InputError that lists the known names unless `name` is one. kind: such as "Scene: layer"."""
     if not isinstance(name, Hashable) or isinstance(name, bool) or name not in names:
         raise InputError(f"{kind} {name!r} is not known; known: {', '.join(map(repr, names)) or 'none'}")
 

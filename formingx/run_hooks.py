@@ -48,36 +48,16 @@ class MeshAdaptation(Protocol):
     """Adaptation of the mesh to the states of a first run, for `trace(adapt_mesh=...)`."""
 
     def check(self, mesh: Mesh) -> None:
-        """Check that `mesh` can be adapted.
-
-        Raises:
-            InputError: the mesh cannot be adapted.
-        """
+        """Raise an InputError if `mesh` cannot be adapted."""
 
     def make(self, path: Path, options: Mapping[str, float]) -> Mesh:
-        """Return a mesh of the same body that is adapted to the states of a run.
-
-        Args:
-            path: the first run.
-            options: {name: value} of arguments of `formingx.mesh.adapted`; the caller has checked the names.
-
-        Returns:
-            The adapted mesh.
-        """
+        """Return a mesh of the same body, adapted to the states of a first run by options of `formingx.mesh.adapted`.
+        The caller has checked the names."""
 
 
 def check_argument(caller: str, argument: str, given: Any, what: str) -> None:
-    """Check the argument `remesh` or `stop_at` of a run: it must be a `RunExtension` for this argument.
-
-    Args:
-        caller: name of the calling function, for messages.
-        argument: "remesh" or "stop_at".
-        given: value of the argument.
-        what: description of the required extension, for the error message.
-
-    Raises:
-        InputError: the value is no `RunExtension`, or one for the other argument.
-    """
+    """Raise an InputError unless the argument `remesh` or `stop_at` of a run is a `RunExtension` for this argument.
+    what: description of the required extension, for the message."""
     if not isinstance(given, RunExtension) or given.argument != argument:
         raise InputError(f"{caller}: {argument} = {given!r}: must be {what}")
 
@@ -94,14 +74,7 @@ def register_adaptation(adaptation: MeshAdaptation) -> None:
 
 
 def adaptation(caller: str) -> MeshAdaptation:
-    """Return the registered mesh adaptation.
-
-    Args:
-        caller: name of the calling function, for the message.
-
-    Raises:
-        InputError: the extension `adapt` is not installed.
-    """
+    """Return the registered mesh adaptation; InputError in the name of `caller` without the extension `adapt`."""
     if not _adaptation:
         raise InputError(f"{caller}: adapt_mesh: the extension 'adapt' of formingx is not installed")
     return _adaptation[0]

@@ -30,11 +30,9 @@ log = logging.getLogger("formingx")
 def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
                         run: Callable[[Scene, Any, bool], Path]) -> Path:
     """Return the path of a run on a mesh that is adapted to a first run, `Path.pilot`, kept in the folder "pilot".
-
     adapt_mesh, start, resume, checkpoint: arguments of `caller`. `run` maps a scene, a checkpoint and `resume` to a
-    path. Raise `InputError` for an argument that is not allowed. Raise `ConvergenceError` if the second run failed, or
-    the first with fewer than three states.
-    """
+    path. Raise `InputError` for an argument that is not allowed, `ConvergenceError` if the second run failed, or the
+    first with fewer than three states."""
     if start is not None:
         raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins with the unloaded body and makes"
                          f" the mesh; with start a run continues on its own mesh: give only one of them")

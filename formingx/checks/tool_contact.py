@@ -75,11 +75,9 @@ def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:
-    """Return the gaps at the contact points of given `FaceContact` objects in a state, shape (n,), length.
-
-    A gap is negative inside the tool. The points of all ranks are included, except those whose position is prescribed:
-    a rim that is held on a flange touches nothing. Without other points all are included; collective.
-    """
+    """Return the gaps at the contact points of `FaceContact` objects in a state, shape (n,), length, negative inside a
+    tool. The points of all ranks are included, except those of prescribed position (a rim held on a flange touches
+    nothing), unless there are no others; collective."""
     with problem.state_context(state):
         gaps = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
                 for contact in contacts]

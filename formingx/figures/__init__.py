@@ -21,19 +21,8 @@ class Axes(Protocol):
 
 def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
            rows: int = 1) -> tuple[Any, Any]:
-    """Return an empty matplotlib figure with one or several plots in a grid; saving it needs no screen.
-
-    Args:
-        columns: number of plots side by side.
-        width: width of one plot, inches.
-        height: height of one plot, inches.
-        ratios: relative widths of the columns; default equal.
-        rows: number of plots one above the other.
-
-    Returns:
-        The figure, and an array of the axes of its plots, row by row. For a single plot, its axes are returned instead
-        of the array.
-    """
+    """Return an empty matplotlib figure with `columns` x `rows` plots of a size in inches, and its axes, row by row, or
+    one. ratios: relative widths of the columns, default equal. Saving the figure needs no screen."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     from .notebook import ShownAxes, ShownFigure
@@ -88,15 +77,9 @@ class _LoadedWhenUsed(types.ModuleType):
 
 
 def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> None:
-    """Draw the sections of rigid tools in grey, within a box.
-
-    Args:
-        axes: matplotlib axes.
-        placed: for each tool the pair (`Tool`, its displacement (r, z), length).
-        low: lower left corner (r, z) of the box, length.
-        high: upper right corner (r, z) of the box, length.
-        mirror: True to draw the mirror images of the tools at r = 0, too.
-    """
+    """Draw the sections of rigid tools in grey, within a box from `low` to `high`, (r, z), length.
+    placed: (`Tool`, its displacement (r, z), length) of each. mirror: True to draw their mirror images at r = 0,
+    too."""
     box = np.array([low, high], dtype=float)
     n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)
     r, z = (np.linspace(box[0, k], box[1, k], n[k]) for k in (0, 1))

@@ -22,95 +22,42 @@ class Start(Protocol):
 
 class History(Protocol):
     """Interface of the history variables of a material, a contact or the temperature.
-
-    Contacts are updated first, then materials, then the temperature, which receives the heat that they dissipate. A
-    run uses the methods as follows:
-
-    - `start` sets the values of the reference configuration.
-    - `get` stores the values, `advance` updates them to the end of a trial step, and `put` restores the stored ones.
-    - `advance` alone accepts a state.
-    - `get` and `put` also change to another accepted state and back.
-    - `save` makes data for a file, and `load` takes them back, on any number of ranks.
-    - `transfer` transfers the values to a problem of the same body on another mesh.
-
-    The result of `get` is never changed and is valid on the same ranks only. The result of `save` is valid on any
-    ranks.
-    """
+    `start` sets the values of the reference configuration. `advance` updates them to the end of a step; `get` stores
+    them before, and `put` restores them, or another accepted state. `save` makes data for a file, `load` takes them
+    back, on any number of ranks; `transfer` moves them to a problem of the same body on another mesh. The result of
+    `get` is never changed, and is valid on the same ranks only. Contacts are updated first, then materials, then the
+    temperature, which receives the heat that they dissipate."""
 
     def start(self) -> None:
         """Set the history variables to their values in the reference configuration."""
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the history variables to a state at the end of a step; the forms must be set to this state.
-
-        Args:
-            x: unknowns of the state, locally owned entries, shape (n,).
-            control: load parameter (control) of the state, dimensionless.
-            start: state at the beginning of the step; None for histories that do not depend on it.
-        """
+        """Update the history variables to x, owned entries, shape (n,), at the end of a step; the forms must be set to
+        it. start: state at the beginning of the step; None for histories that do not depend on it."""
 
     def get(self) -> Any:
-        """Return the current history variables.
-
-        Returns:
-            Values that `put` accepts.
-        """
+        """Return the current history variables, for `put`."""
 
     def put(self, variables: Any) -> None:
-        """Set the history variables.
-
-        Args:
-            variables: values from `get`.
-        """
+        """Set the history variables from `get`."""
 
     def save(self, variables: Any) -> dict[str, Any]:
-        """Return history variables as plain data and arrays, the same on all ranks; collective.
-
-        Args:
-            variables: values from `get`.
-
-        Returns:
-            Data that do not depend on the number of ranks.
-        """
+        """Return history variables from `get` as plain data and arrays, the same on any number of ranks; collective."""
 
     def load(self, data: dict[str, Any]) -> Any:
-        """Return the history variables of this rank from the result of `save`.
-
-        Args:
-            data: result of `save`.
-
-        Returns:
-            Values that `put` accepts.
-
-        Raises:
-            InputError: the data belong to another mesh, material or boundary.
-        """
+        """Return values for `put` on this rank from data of `save`; InputError: another mesh, material or boundary."""
 
     def transfer(self, source: Any, variables: Any, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> Any:
-        """Return the history variables on this mesh, from a problem of the same body on another mesh; collective.
-
-        Args:
-            source: history of the same material, contact or temperature in the other problem. That problem must be set
-                to the state to transfer.
-            variables: history variables of `source` in this state.
-            x: unknowns of the state on this mesh, locally owned entries, shape (n,). The forms of this problem must be
-                set to them.
-            control: load parameter (control) of the state, dimensionless.
-            mapping: function from reference points of the other mesh, shape (n, coordinates), to points of this mesh.
-
-        Returns:
-            Values that `put` accepts.
-        """
+        """Return values for `put` on this mesh, from `variables` of the same history `source` on another mesh;
+        collective. The problem of `source` must be set to the state to transfer, the forms of this one to x, owned
+        entries, shape (n,). mapping: function from reference points there, shape (n, coordinates), to points here."""
 
 
 @runtime_checkable
 class ConstitutiveHistory(History, Protocol):
     """Interface of the history variables of one material of the body.
-
-    Attributes:
-        rate_dependent: True if the stress depends on time; False if it depends on past strains alone.
-    """
+    rate_dependent: True if the stress depends on time, False if on past strains alone."""
 
     rate_dependent: bool
 

@@ -21,7 +21,7 @@ class InternalVariables(NamedTuple):
 
     Attributes:
         time: process time of the last accepted state.
-        values: {name: values in the locally owned cells of the material's layers, shape (cells, points, components)}.
+        values: {name: values in the locally owned cells of the layers, shape (cells, points, components)}.
     """
 
     time: float
@@ -29,12 +29,7 @@ class InternalVariables(NamedTuple):
 
 
 class MaterialHistory:
-    """Internal variables of one material at the quadrature points of the energy.
-
-    Args:
-        forms: the `Formulation`.
-        terms: the `MaterialTerms`.
-    """
+    """Internal variables of one material at the quadrature points of the energy."""
 
     def __init__(self, forms: Any, terms: Any):
         self._forms, self._terms = forms, terms

@@ -146,11 +146,8 @@ class MidSurfaceProbe(Probe):
 
     def _average_slopes(self, element: Any, geometry: Any) -> None:
         """Replace `_tangent` by its mean over both elements at points where two elements meet; collective.
-
-        Data for the mean of du/dS at these points are stored in `_ends`, with the displacement u and the reference arc
-        length S of the mid-surface. element: scalar element of a displacement component. geometry: scalar element of
-        the mid-surface.
-        """
+        `_ends` has data for the mean of du/dS there, by the reference arc length S. element, geometry: scalar elements
+        of a displacement component and of the mid-surface."""
         forms, domain = self._problem.forms, self._problem.forms.domain
         nodes = cell_node_positions(domain, own_cells(domain))
         R = forms.nearest(self.points)[:, 0]

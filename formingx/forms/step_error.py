@@ -29,11 +29,7 @@ its pole, with 4 less than 0.5 % (tests/test_kbkz_scenes.py).
 
 
 class StepError:
-    """Estimator of the time integration error of the steps of a problem.
-
-    Args:
-        problem: the `Problem`.
-    """
+    """Estimator of the time integration error of the steps of a problem."""
 
     def __init__(self, problem: Any):
         self._problem, self._forms = problem, problem.forms
@@ -49,13 +45,10 @@ class StepError:
 
     def estimate(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """Estimate the relative error of a step from the last of `past` to x, shape (n,), by step doubling.
-
-        share: weights of `past` and of x that give the displacement halfway in time, shape (k + 1,). Return the error
-        of the stress, and its part left after relaxation for another such time, which adds up from step to step. Errors
-        are root mean squares over the body, relative to the largest stress at the start, at the end and after complete
-        relaxation. They are multiplied by 4 for materials whose errors always have the same sign
-        (`Material.motion_variables` or an integral law).
-        """
+        share: weights of `past` and x for the displacement halfway in time, shape (k + 1,). Return the error of the
+        stress, and its part left after relaxation for another such time, which adds up over steps. Both are root mean
+        squares over the body, over the largest stress at the start, at the end and after relaxation; times 4 for
+        materials whose errors have one sign (`Material.motion_variables`, integral laws)."""
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
         step = end - old.time if self._stresses else 0.0

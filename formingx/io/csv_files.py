@@ -98,10 +98,8 @@ def read(file: Any) -> CsvTable:
 
 def records(file: Any) -> list[tuple[int, list[str]]]:
     """Return (line number, cells as text) of each row of a CSV file, with points for decimal commas.
-
-    Cells are separated by semicolons or tabs, if the first line or half of the lines contain one, otherwise by commas.
-    Empty lines and those from # are skipped. Unreadable files, quotes or mixed decimals are an InputError.
-    """
+    Cells are separated by semicolons or tabs, if the first line or half of the lines contain one, else by commas. Empty
+    lines and those from # are skipped. Unreadable files, quotes or mixed decimals are an InputError."""
     name = os.fspath(file)
     try:
         with open(name, "rb") as stream:

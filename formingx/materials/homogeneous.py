@@ -169,10 +169,8 @@ class MaterialStability(NamedTuple):
 
 def stability(response: Response, constants: Any, low: float, high: float) -> MaterialStability:
     """Return the ranges of stretch around 1 in which a material is stable in three homogeneous tests.
-
     The criteria are a finite stress, an increasing force and Drucker's. Ends are searched for at 400 stretches of equal
-    ratio from `low` to `high`, then by bisection. Constants have the order of `response`.
-    """
+    ratio from `low` to `high`, then by bisection. Constants have the order of `response`."""
     constants = list(constants)
 
     @np.errstate(all="ignore")

@@ -15,25 +15,10 @@ class IntegralLaw(Protocol):
     coefficients: Mapping[str, object]
 
     def history(self, forms: object, terms: object) -> object:
-        """Return the history of the material: its past states, from which the fields `coefficients` are computed.
-
-        Args:
-            forms: the `Formulation` of the body.
-            terms: the `MaterialTerms` of the material.
-
-        Returns:
-            A `formingx.forms.history.ConstitutiveHistory`. Its method `refresh()` updates the fields
-            `coefficients` to the current displacements and time of the forms.
-        """
+        """Return the history of past states, a `formingx.forms.history.ConstitutiveHistory`, for a body and a material.
+        forms, terms: its `Formulation` and `MaterialTerms`. `refresh()` updates the fields `coefficients` to them."""
 
     def unsymmetric_work(self, C: Sequence[object], dC: Sequence[object], coefficients: Mapping[str, object]) -> object:
-        """Return the part of the virtual work per reference volume that does not derive from a potential.
-
-        Args:
-            C: entries 11, 22, 12, 33 of the isochoric right Cauchy-Green tensor (UFL).
-            dC: virtual changes of these entries (UFL).
-            coefficients: {name of a coefficient: its function (UFL)}.
-
-        Returns:
-            Virtual work (UFL, stress); None if the stress derives from a potential.
-        """
+        """Return the virtual work (UFL, stress) per reference volume that derives from no potential, or None.
+        C, dC: entries 11, 22, 12, 33 of the isochoric right Cauchy-Green tensor and its virtual change (UFL).
+        coefficients: {name: function (UFL)}."""

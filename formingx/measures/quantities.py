@@ -24,15 +24,7 @@ class Quantity:
     smooth = True
 
     def value(self, x: Any, control: float) -> float:
-        """Return the value of the quantity in a state.
-
-        Args:
-            x: unknowns of the problem (PETSc vector).
-            control: load parameter (control), dimensionless.
-
-        Returns:
-            The value, in the user's units.
-        """
+        """Return the value of the quantity in a state, the unknowns x (PETSc vector), in the user's units."""
         raise NotImplementedError
 
     def equation(self, target: float) -> Any:

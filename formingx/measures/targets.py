@@ -16,11 +16,8 @@ _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 
 class Amplitude(Quantity):
     """Output quantity that is a pressure, a travel, the process time or the control itself.
-
-    Between two stages the control goes from 0 to 1 and activates or deactivates loads. The quantity of such a load is
-    then the load times the control, or times 1 - control. The item has a number in `Scene.items`, -1 for the process
-    time, None for the control.
-    """
+    It has a number in `Scene.items`, -1 for the process time, None for the control. Between two stages the control goes
+    from 0 to 1 and activates or deactivates loads: such a quantity is the load times the control, or 1 - control."""
 
     def __init__(self, problem: Any, number: int | None):
         self._problem, self._number = problem, number

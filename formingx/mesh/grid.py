@@ -117,11 +117,9 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
 
 def _tagged(grid: Grid, what: str) -> tuple:
     """Return the arrays of a grid with its names as tags, in the order of nodes of DOLFINx.
-
     They are cells (m, 3 or 6), points (n, 2 or 3), length, cell tags (m,), edges (k, 2 or 3), edge tags (k,), {layer:
-    tag} and {boundary: tags}. An edge of several boundaries has its own tag. Invalid elements, layers or edges are an
-    InputError.
-    """
+    tag} and {boundary: tags}; an edge of several boundaries has its own tag. Invalid elements, layers or edges are an
+    InputError."""
     triangles = np.concatenate(list(grid.layers.values()))
     used = np.unique(triangles)
     number = np.full(len(grid.points), -1, dtype=np.int64)

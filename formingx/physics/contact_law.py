@@ -587,11 +587,9 @@ class Law(NormalLaw):
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         """Compute the tractions at positions x, shape (n, 2), length, with their stiffness and history.
-
         A point whose `sense`, shape (n,), would reverse sticks for one iteration: else Newton's method would alternate.
-        `expected`: distances and slips predicted to first order. On a curved tool those at x differ in second order,
-        which a stiff penalty turns into large tractions.
-        """
+        `expected`: distances and slips predicted to first order; those at x differ in second order on a curved tool,
+        which a stiff penalty turns into large tractions."""
         n, out = len(x), self._evaluate(x, old, sense, expected)
         N, T, slides = out[2 * n:3 * n], out[3 * n:4 * n], out[4 * n:5 * n]
         return Tractions(out[:2 * n].reshape(n, 2), N, T, slides, lambda: out[5 * n:9 * n].reshape(n, 2, 2),

@@ -127,11 +127,8 @@ def _smallest_J(problem: Any, elements: Body) -> tuple[float, Place, tuple]:
 
 
 def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], Place, np.ndarray]:
-    """Return the residual of each field, and the place and position of the node with the largest residual force.
-
-    Residuals are {field: norm over the norm of the support forces}, for "displacement", "pressure" and "multipliers".
-    The place is a `Place` with layer and nearest boundary; the reference position (R, Z) has the shape (2,), length.
-    """
+    """Return the residual of each field, and the `Place` and position (R, Z), length, of the largest residual force.
+    Residuals are {"displacement", "pressure" or "multipliers": norm over the norm of the support forces}."""
     out, comm = x.duplicate(), problem.comm
     problem.residual(x, control, out)
     values, n = out.array_r.copy(), problem.n_owned

@@ -32,15 +32,9 @@ class Reader(Protocol):
 
     def part(self, state: State, density: float | None, trim: object, heights: object, units: Units) -> KeyNumbers:
         """Return the key numbers of the part in a state.
-
-        Args:
-            state: the state.
-            density: density of the material, g/cm3; None: no weight.
-            trim: radius at which the part is cut off, or ("height", h), length; in three dimensions a z coordinate
-                beyond which the part lies; None: not cut.
-            heights: axial distances from the pole at which the wall is listed, length; empty in three dimensions.
-            units: units of the script.
-        """
+        density: g/cm3, or None. trim: radius at which the part is cut off, ("height", h), or None, length; in three
+        dimensions z of a plane beyond which the part lies. heights: axial distances from the pole with a wall, length;
+        none in three dimensions."""
 
     def stress(self, state: State, depth: float | None) -> Any:
         """Return the stresses of the body in a state; depth: in a sheet in three dimensions, from 0 to 1, or None."""
@@ -51,35 +45,18 @@ class Reader(Protocol):
 
     def view(self, file: object, state: State, grid: float | None, camera: object) -> None:
         """Draw the body in a state as a PNG file, coloured by its wall over the original thickness.
-
-        Args:
-            file: its name ends in .png.
-            state: the state.
-            grid: size of the squares of a grid that is printed on a flat sheet in three dimensions, length; None: none.
-            camera: name of a view, or direction from the part to the camera; None: a default.
-        """
+        grid: size of the squares of a grid printed on a flat sheet in three dimensions, length, or None. camera: name
+        of a view, direction from the part to the camera, or None."""
 
     def solid(self, state: State) -> tuple:
         """Return the part in a state as a closed surface of triangles.
-
-        Returns:
-            Points (x, y, z), shape (n, 3), length; for each triangle the row numbers of its corners, shape (m, 3); wall
-            over original thickness at the points, shape (n,).
-        """
+        Points (x, y, z), shape (n, 3), length; row numbers of corners, shape (m, 3); wall over original thickness at
+        the points, shape (n,)."""
 
     def report(self, file: object, title: str, failure: object, units: Units, density: float | None,
                trim: object) -> FilePath:
-        """Write the report of the run as an HTML file, and return the path of the file.
-
-        Args:
-            file: its name ends in .html.
-            title: heading of the page.
-            failure: the `ConvergenceError` that ended the run, or None.
-            units: units of the script, for the labels.
-            density: density of the material, g/cm3; None: no weight.
-            trim: radius at which the part is cut off, or ("height", h), length; in three dimensions a z coordinate
-                beyond which the part lies; None: not cut.
-        """
+        """Write the report of the run as an HTML file with a title, and return its path.
+        failure: the `ConvergenceError` that ended the run, or None. density: g/cm3, or None. trim: see `part`."""
 
 
 class SectionReader:

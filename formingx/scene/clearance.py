@@ -14,10 +14,8 @@ from .scene import Scene
 
 def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
     """Check that tools do not overlap in the stages of a process, and that none passes a constrained boundary.
-
     Travels are {number in `Scene.items`: length}, None: all 0. Stages from which on a travel is unknown are returned,
-    to be checked when the run reaches them. A violation is an InputError.
-    """
+    to be checked when the run reaches them. A violation is an InputError."""
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
     travels, unknown = travels or dict.fromkeys(tools, 0.0), []

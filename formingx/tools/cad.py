@@ -36,13 +36,8 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
 
 
 class _Reader:
-    """Reader of one STEP or BREP file in a separate process, which ends with the `with` block.
-
-    The kind is "step" or "brep".
-
-    Attributes:
-        bounds: {number of a curve: [lowest, highest value of its curve parameter]}.
-    """
+    """Reader of one "step" or "brep" file in a separate process, which ends with the `with` block.
+    bounds: {number of a curve: [lowest, highest value of its curve parameter]}."""
 
     def __init__(self, file: str, kind: str):
         self._file, self._seconds = file, _BASE_SECONDS + os.path.getsize(file) // _BYTES_PER_SECOND

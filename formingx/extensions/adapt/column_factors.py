@@ -22,24 +22,10 @@ _STRESS_ORDER = 2
 
 
 def column_factors(path: Any, max_rotation: float | None, error: float | None) -> np.ndarray:
-    """Return the factors by which the n columns of a mesh should become longer (below 1: shorter).
-
-    A column consists of the elements through the sheet between two successive cross-sections. A factor is the length
-    that the column should have over its present length. The smallest factor over the states of the run is returned.
-
-    Args:
-        path: the run.
-        max_rotation: largest angle, radians, by which the sheet turns from one end of a column to the other. The
-            length of a column on a fillet of a tool is also at most `max_rotation` times the fillet radius. None:
-            ignored.
-        error: largest estimated error of the stress over the stress, both as norms over the body; None: ignored.
-
-    Returns:
-        Factors, shape (n,); inf where no state demands a length.
-
-    Raises:
-        InputError: a sheet in three dimensions, a mesh without columns, or a limit that is not above 0.
-    """
+    """Return the factors by which the n columns of a mesh should become longer, shape (n,); inf where no state demands
+    one. A column has the elements between two cross-sections; its factor is the smallest over the states of the run.
+    The sheet turns along it by at most `max_rotation`, radians, with at most this times a fillet radius as length.
+    `error`: allowed relative error of the stress, as norms over the body. None: ignored."""
     section_only(path.scene, "column_factors", "use fx.mesh.adapted")
     max_rotation, error = (value if value is None else positive(f"column_factors: {name}", value)
                     for name, value in (("max_rotation", max_rotation), ("error", error)))
@@ -101,10 +87,8 @@ def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) ->
 
 def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """Return the angle by which the sheet turns along each of n columns, radians, at most 1, shape (n,).
-
     Edges have shape (m, 3, 2). A jump between two columns counts half in each. Each of the two `sides` has rows of
-    edges and masks of those that end at the column's end, (n,).
-    """
+    edges and masks of those that end at the column's end, (n,)."""
     tangent = np.zeros(edges.shape[-1])                      # at both ends of each column, averaged over both faces
     for numbers, reversed_edges in sides:
         a, b, m = edges[numbers].transpose(1, 0, 2)

@@ -27,10 +27,7 @@ def arc_length(points: np.ndarray) -> np.ndarray:
 
 
 class SampledCurve:
-    """Curve through points in the space of c columns, interpolated over the arc length.
-
-    Akima's interpolation causes no oscillation at a kink, such as a first contact. The points have shape (n, c), in
-    order, each column divided by its range.
+    """Curve through points, shape (n, c), each column over its range, in arc length (Akima's interpolation: no oscillation).
 
     Attributes:
         evaluate: function that returns the points of the curve at arc lengths.

@@ -13,23 +13,9 @@ from ...errors import InputError, as_list, check_type, count, finite
 
 
 class Knots:
-    """A function of a length from 0 to 1 that is given by its values at equidistant knots.
-
-    The argument of the function is one length or an array of lengths. Lengths outside 0 to 1 count as the nearest end.
-    Lengths below -1 or above 2 are refused: they are lengths of the body that were not divided by its length.
-
-    Args:
-        values: values at the k knots, shape (k,).
-        smooth: True for a cubic spline through the knots, False for straight lines between them.
-
-    Attributes:
-        values: values at the k knots, shape (k,).
-        smooth: True for a cubic spline through the knots, False for straight lines between them.
-        coordinates: lengths of the knots, from 0 to 1, shape (k,).
-
-    Raises:
-        InputError: the function is called with a length that is not from 0 to 1.
-    """
+    """A function of a length from 0 to 1, given by its values at k equidistant knots, shape (k,), whose lengths are
+    `coordinates`. It is a cubic spline if `smooth`, else straight in between. Lengths outside 0 to 1 count as the
+    nearest end, below -1 or above 2 they are an InputError: they were not divided by the length of the body."""
 
     def __init__(self, values: Any, smooth: bool = False):
         self.values, self.smooth = np.array(values, dtype=float), smooth

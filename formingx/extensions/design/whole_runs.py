@@ -26,15 +26,8 @@ Outputs = dict[Any, np.ndarray]
 
 
 class WholeRuns:
-    """Whole runs of a design at changed parameters, one after the other or in other processes.
-
-    Args:
-        workers: number of parallel processes; 1 for runs in this process.
-        executor: executor of `concurrent.futures` for the runs; None for own processes.
-
-    Attributes:
-        count: number of runs so far.
-    """
+    """Whole runs of a design at changed parameters, `workers` at a time: 1 in this process, else in the `executor` or
+    own processes. `count`: number of runs so far."""
 
     def __init__(self, workers: int, executor: futures.Executor | None):
         self._workers, self._executor, self.count = workers, executor, 0
@@ -49,13 +42,9 @@ class WholeRuns:
         return number, f"{number} for differences of whole runs, {where}" if number else ""
 
     def neighbours(self, design: Any, vector: np.ndarray, measure: Any) -> list[tuple[Outputs, float]]:
-        """Compute a run with each parameter changed, and return its outputs with the change, by parameter.
-
-        Args:
-            design: the `Design`, which other processes must be able to import.
-            vector: parameters of the base run, shape (n,).
-            measure: quantity that the outputs must have; functions of a path are kept for later calls.
-        """
+        """Compute a run with each entry of the parameters, shape (n,), changed; return its outputs and the change, by
+        parameter. The design must be importable in other processes. Outputs have the quantity `measure`; functions of a
+        path are kept for later calls."""
         if callable(measure) and measure not in self._functions:
             self._functions.append(measure)
         p = design.parameters

@@ -57,12 +57,7 @@ class HeatState(NamedTuple):
 
 
 class CoolingHistory:
-    """History variables of the temperature: body and conducting tools, as a `formingx.forms.history.History`.
-
-    Args:
-        cooling: the `Cooling` of the scene.
-        problem: the `Problem` of the run.
-    """
+    """History variables of the temperature: body and conducting tools, as a `formingx.forms.history.History`."""
 
     def __init__(self, cooling: Any, problem: Any):
         forms, scene = problem.forms, problem.scene
@@ -98,14 +93,8 @@ class CoolingHistory:
         return [(touch, contact, touch.conductance.copy()) for touch, contact in zip(touching, contacts, strict=True)]
 
     def errors_in_space(self, states: Sequence[Any]) -> np.ndarray:
-        """Estimate the discretisation errors of the temperature in states of the run; collective.
-
-        Args:
-            states: accepted states.
-
-        Returns:
-            Largest error in each state, degrees, shape (states,).
-        """
+        """Estimate the largest discretisation error of the temperature in each accepted state, degrees, shape
+        (states,); collective."""
         return np.array([error for error, _ in self._space_errors(states)])
 
     def _space_errors(self, states: Sequence[Any]) -> list[tuple[float, str]]:
@@ -144,17 +133,9 @@ class CoolingHistory:
         return ""
 
     def findings(self, states: Sequence[Any]) -> list[Finding]:
-        """Return a warning if the mesh is too coarse for the temperatures of a run; collective.
-
-        The error is estimated in at most eight states and at the ends of stages. At the end of a contact that moves on
-        it decays, so there it counts at the ends of stages only.
-
-        Args:
-            states: accepted states, in order.
-
-        Returns:
-            List with one warning, or an empty list if the error is below its tolerance in all of these states.
-        """
+        """Return a warning in a list if the mesh is too coarse for the temperatures of a run, else an empty one;
+        collective. The error is estimated in at most eight states and at the ends of stages. At the end of a contact
+        that moves on it decays, so there it counts at the ends of stages only."""
         states = [state for state in states if state.time > 0]
         if not states:
             return []
@@ -191,18 +172,9 @@ class CoolingHistory:
         self._update_problem()
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Solve the heat equation over an accepted step, with the body at its position halfway through the step.
-
-        A contact node that closes or opens in the step has half its conductance, so that the step is of second order.
-
-        Args:
-            x: unknowns at the end of the step, locally owned entries, dimensionless.
-            control: load parameter (control) at the end of the step, dimensionless.
-            start: state at the start of the step; None: the body has its final position during the whole step.
-
-        Raises:
-            ConvergenceError: the end of the step was not reached.
-        """
+        """Solve the heat equation over a step to x, owned entries, with the body at its position halfway through the
+        step. A contact node that closes or opens has half its conductance: the step is of second order. start: state at
+        the start; None: the body is at x all the time. ConvergenceError: the end was not reached."""
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced
             power = self._cooling.work_to_heat * self._body.assembled(self._dissipated)
@@ -271,34 +243,19 @@ class CoolingHistory:
         raise ConvergenceError(f"heat: time {until:.6g} was not reached in {_MAX_STEPS} steps")
 
     def get(self) -> HeatState:
-        """Return the present state of the heat equation.
-
-        Returns:
-            The state.
-        """
+        """Return the present state of the heat equation."""
         return HeatState(self._time, self._state[0].copy(), [excess.copy() for excess in self._state[1:]], self._dt,
                          self._power, self._before)
 
     def put(self, variables: HeatState) -> None:
-        """Set the present state of the heat equation.
-
-        Args:
-            variables: result of `get`.
-        """
+        """Set the present state of the heat equation, a result of `get`."""
         self._time, self._dt = variables.time, variables.step
         self._power, self._before = variables.power, variables.before
         self._state = [variables.temperature.copy(), *(excess.copy() for excess in variables.tool_excess)]
         self._update_problem()
 
     def save(self, variables: HeatState) -> dict[str, Any]:
-        """Return a state of the heat equation as plain data, the same on all ranks; collective.
-
-        Args:
-            variables: result of `get`.
-
-        Returns:
-            Data for `load`.
-        """
+        """Return a state of the heat equation as plain data for `load`, the same on all ranks; collective."""
         plain = partial(gathered, self._problem.comm)
         return {"time": variables.time, "step": variables.step, "points": plain(self._body.points),
                 "temperature": plain(variables.temperature),
@@ -308,17 +265,8 @@ class CoolingHistory:
                           for touch, excess in zip(self._body.tool_contacts, variables.tool_excess, strict=True)]}
 
     def load(self, data: dict[str, Any]) -> HeatState:
-        """Return the state of the heat equation of this rank from stored data.
-
-        Args:
-            data: result of `save`.
-
-        Returns:
-            A state for `put`.
-
-        Raises:
-            InputError: the data belong to another mesh, or only one of both runs has `work_to_heat`.
-        """
+        """Return the state of this rank from data of `save`; InputError: another mesh, or `work_to_heat` in one run
+        only."""
         matching = partial(matching_rows, tolerance=1e-9 * np.abs(data["points"]).max(),
                            message="the temperature history belongs to another mesh")
         rows = matching(self._body.points, data["points"])
@@ -333,20 +281,9 @@ class CoolingHistory:
 
     def transfer(self, source: CoolingHistory, variables: HeatState, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
-        """Interpolate a state of the heat equation from another mesh to this one.
-
-        The material histories must have been transferred before, since they give the heat of the dissipated work.
-
-        Args:
-            source: history of the temperature on the other mesh.
-            variables: state of `source`, from `get`.
-            x: not used.
-            control: not used.
-            mapping: function from reference points of the other mesh, shape (n, 2), to reference points of this mesh.
-
-        Returns:
-            A state for `put`.
-        """
+        """Interpolate a state of the heat equation from the history `source` on another mesh to this one.
+        The material histories must have been transferred before: they give the heat of dissipated work. mapping: from
+        reference points there, shape (n, 2), to points here."""
         comm, before = self._problem.comm, variables.before
         to_body = MovingLeastSquares(comm, mapping(source._body.points), self._body.points).fitted
         touched = (zip(source._body.tool_contacts, variables.tool_excess, strict=True)

@@ -358,10 +358,8 @@ class HeatRun:
 
     def _slope(self, k: int) -> list[np.ndarray]:
         """Return the time derivatives of the temperatures in state k, degrees per time, with the shapes of `states[k]`.
-
-        They are slopes of the parabola through this state and its two neighbours. At both ends of the run it is the
-        parabola through the nearest three states. Of two states the chord is used.
-        """
+        They are slopes of the parabola through it and its two neighbours (at an end the nearest three), or of the chord
+        of two states."""
         i = min(max(k, 1), len(self._times) - 2)
         if i < 1:
             return [(b - a) / (self._times[1] - self._times[0]) for a, b in zip(*self.states[:2])]

@@ -72,11 +72,9 @@ class MemoryIntegral:
     def weights_after(self, weights: np.ndarray, step: Any, last_step: Any = 0.0,
                       allowed: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the weights W of K past states after a step in reduced time, stress, and their slopes by its length.
-
         The stress is the sum of W h Cbar_k^-1; results have shape (K, n) or (K, 1), the given weights (K, modes[, n]).
         They are exact for a parabola of h Cbar_k^-1 in time, so long steps are of second order too. Steps are numbers
-        or (n,); without `last_step`, or where `allowed` is 0, it is linear.
-        """
+        or (n,); without `last_step`, or where `allowed` is 0, it is linear."""
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
         decay, G = np.exp(-y), self.modulus[:, None]

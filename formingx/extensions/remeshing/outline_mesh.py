@@ -22,12 +22,10 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
              layer: str, axisymmetric: bool, comm: Any, volume: float | None = None,
              outside: Callable[[np.ndarray, frozenset[str]], np.ndarray] = lambda points, names: points) -> Mesh:
     """Return a mesh of six-node triangles inside an outline, with second-order geometry along it; on one rank.
-
-    Edges, in counter-clockwise order, have first end, second end and midpoint, shape (m, 3, 2), length, each with the
-    `names` of its boundaries. Elements have `size`, and `corner` at the positions `corners`, shape (k, 2). R is scaled
-    to give `volume` (length^3, or length^2 in plane strain). `outside` moves new outline points, shape (n, 2), out of
-    tools. A crossing outline, or no mesh by gmsh, is an InputError.
-    """
+    Edges, counter-clockwise, have ends and midpoint, shape (m, 3, 2), length, each with the `names` of its boundaries.
+    Elements have `size`, and `corner` at `corners`, shape (k, 2). R is scaled to give `volume` (length^3, or length^2
+    in plane strain). `outside` moves new outline points, shape (n, 2), out of tools. A crossing outline, or no mesh by
+    gmsh, is an InputError."""
     turns = [k for k in range(len(edges)) if names[k] != names[k - 1] or (corners == edges[k, 0]).all(1).any()] or [0]
     ends, middles, named = [], [], []
     for first, last in zip(turns, [*turns[1:], turns[0] + len(edges)]):

@@ -221,10 +221,8 @@ def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
 
 def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
     """Return a new segment of a path: a new mesh of the body in its last state, and the equilibrium on it.
-
-    Several element sizes are tried. The first mesh, else the best, on which J is far from the limits
-    `Remesh.volume_ratio` is taken. None in equilibrium raises a ConvergenceError.
-    """
+    Of several element sizes, the first, else the best, mesh with J far from the limits `Remesh.volume_ratio` is taken.
+    None in equilibrium raises a ConvergenceError."""
     low, high = remesh.volume_ratio
     found, reason = [], ""
     for share in _SIZE_FACTORS:

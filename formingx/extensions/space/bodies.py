@@ -15,12 +15,9 @@ from ...mesh.edges import edges_of
 
 
 def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
-    """Divide a closed surface into groups of bodies whose bounding boxes do not overlap.
-
-    points: shape (n, 3), length; triangles: shape (m, 3). Return for each group its row numbers of triangles, shape
-    (k,). A cavity belongs to the body around it. Raise `InputError` if the triangles of a body look inward and it is no
-    cavity.
-    """
+    """Return groups of bodies of a closed surface with disjoint bounding boxes: row numbers of its triangles, shape
+    (k,) each. points: shape (n, 3), length; triangles: shape (m, 3). A cavity belongs to the body around it. Raise
+    `InputError` if triangles look inward and are no cavity."""
     parts = _parts(points, triangles)
     bodies = [triangles[part] for part in parts]
     boxes = np.array([[points[body].min((0, 1)), points[body].max((0, 1))] for body in bodies])
@@ -75,11 +72,9 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
     """Return the pairs of triangles at a common edge with solid between them, as row numbers of `triangles`, (2,) each.
-
     Triangles, shape (m, 3), counter-clockwise from outside, are sorted by their angle about the edge. Solid lies after
     one with the edge as (edge[1], edge[0]), up to the next with the opposite order (`directed`, shape (m, 2)). At equal
-    angles the one that ends the solid comes first.
-    """
+    angles the one that ends the solid comes first."""
     forward = directed[:, 0] == edge[0]
     along = points[edge[1]] - points[edge[0]]
     along /= np.linalg.norm(along)

@@ -98,10 +98,8 @@ def turns(facet: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
 
 def corner_groups(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
     """Return the number of the group of each corner of each triangle, shape (m, 3).
-
-    The corners of a group are at one vertex and have one normal. Edges that are not sharp connect their triangles. At a
-    tip, such as that of a cone, each corner is a group. crease: radians.
-    """
+    crease: radians. The corners of a group are at one vertex and have one normal: edges that are not sharp connect
+    their triangles. At a tip, such as that of a cone, each corner is a group."""
     m, facet = len(triangles), unit(area_vectors(points, triangles))
     i, j = sides_of_edges(triangles)
     smooth = turns(facet, i % m, j % m) < crease
@@ -127,11 +125,9 @@ def _connected(m: int, i: np.ndarray, j: np.ndarray, tips: np.ndarray, triangles
 def _tips(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, facet: np.ndarray, i: np.ndarray,
           j: np.ndarray) -> np.ndarray:
     """Return the mask of the vertices that are tips, shape (n,).
-
-    At a tip the normals of the triangles differ from their mean in all directions, and the surface is straight ahead:
-    its triangles turn against the next by less than half that angle. At the pole of a sphere they turn by the same
-    angle or more. groups: shape (m, 3). i, j: sides of the smooth edges, shape (k,).
-    """
+    groups: shape (m, 3). i, j: sides of smooth edges, shape (k,). At a tip normals differ from their mean in all
+    directions, and the triangles turn against the next by less than half that angle; at the pole of a sphere by that
+    angle or more."""
     m, n = len(triangles), int(groups.max()) + 1
     turn = np.zeros(3 * m)                                    # at side k m + t, 0 at a crease
     turn[i] = turn[j] = turns(facet, i % m, j % m)
@@ -167,13 +163,11 @@ def mean_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray) 
 def flat_directions(points: np.ndarray, triangles: np.ndarray, crease: float
                     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the plane of each triangle, or -1, shape (m,), and the k edges across which a region is straight.
-
     For each edge: triangle, number (0, 1, 2), direction across it in the plane, (k, 3). A region is connected and
     coplanar. A facet of a curved surface turns as much against one neighbour as against the next. A plane beside a
     fillet turns half as much against its first facet as this one against the second; so does a cylinder along its
-    rulings, where a torus follows. A region of two triangles or more is thus straight where this ratio is near 1/2.
-    crease: radians.
-    """
+    rulings, where a torus follows: a region of two triangles or more is straight where this ratio is near 1/2. crease:
+    radians."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     m, area = len(triangles), area_vectors(points, triangles)
@@ -254,11 +248,8 @@ def _pairs(wanted: np.ndarray, regions: np.ndarray) -> Iterator[tuple[np.ndarray
 
 def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, crease: float) -> np.ndarray:
     """Return the normals of the groups of corners, fitted to edges of constant curvature, shape (groups, 3).
-
-    The equations of the edges leave modes in which normals tilt alternately, and planes bulge. So the normals of planes
-    are given, and normals have no part along straight directions (`flat_directions`). The equations of the pairs of
-    vertices across an edge, with a small weight, remove such modes elsewhere.
-    """
+    These equations leave modes of alternating tilt and bulging planes. So normals of planes are given, normals have no
+    part along straight directions (`flat_directions`), and pairs across an edge have equations of small weight."""
     from scipy.sparse import coo_array, diags_array
     area, n = area_vectors(points, triangles), int(groups.max()) + 1
     facet, N = unit(area), mean_normals(points, triangles, groups)

@@ -39,11 +39,7 @@ _BEYOND_PLANE = 0.02
 
 
 class SelfPenetration:
-    """Check of the states of a surface for layers that cross each other or a plane of symmetry.
-
-    Args:
-        surface: formulation of the surface.
-    """
+    """Check of the states of a surface for layers that cross each other or a plane of symmetry."""
 
     def __init__(self, surface: Any):
         self._whole, self._planes = surface.whole, surface.scene.symmetry.planes
@@ -75,11 +71,9 @@ class SelfPenetration:
 def crossings(points: np.ndarray, triangles: np.ndarray, least: float, wall: float = 0.0,
               reference: np.ndarray | None = None, crease: float = 0.0) -> np.ndarray:
     """Return the places where edges of a surface pass through its triangles, and their depths, (k, 4), length.
-
-    The depth is the smaller distance of the ends of an edge from the plane of the triangle. Edges count that are deeper
-    than `least`, and deeper than `wall` or 0.4 of the longest edge of their triangle. Of two triangles that are nearer
-    than `crease` in the reference configuration, shape (n, 3), `wall` alone counts.
-    """
+    The depth is the smaller distance of an edge's ends from the plane. Edges count that are deeper than `least`, and
+    than `wall` or 0.4 of the triangle's longest edge. Of two triangles nearer than `crease` in the reference
+    configuration, shape (n, 3), `wall` alone counts."""
     X = points if reference is None else reference
     room = 100
     while True:

@@ -17,13 +17,8 @@ _CUT_PIECES = 40           # extent of a surface over the longest edge of triang
 
 
 class HalfSpace(SolidTool):
-    """Rigid half space normal to a coordinate axis.
-
-    Args:
-        axis: number of the axis, 0 for x, 1 for y, 2 for z.
-        sign: 1 if the solid lies on the side of larger values of the coordinate, else -1.
-        position: value of the coordinate on the plane, length.
-    """
+    """Rigid half space normal to the coordinate axis 0, 1 or 2; `position` is its plane, length.
+    The solid lies on the side of larger values if `sign` is 1, of smaller ones if -1."""
 
     sized = False
 

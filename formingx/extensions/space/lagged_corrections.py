@@ -19,11 +19,7 @@ log = logging.getLogger("formingx")
 
 class LaggedCorrections:
     """Corrections of a solved step, for all faces with lagged contact.
-
-    Args:
-        contacts: the `LaggedApproach` of each face.
-        n: number of locally owned unknowns of the fields.
-    """
+    n: number of locally owned unknowns of the fields."""
 
     def __init__(self, contacts: list[LaggedApproach], n: int):
         self._contacts, self._n = contacts, n
@@ -47,11 +43,9 @@ class LaggedCorrections:
 
     def close_penetrated(self, curve: Curve, old: State, new: State, equation: Constraint | None) -> State:
         """Put points that penetrate a tool into contact where they met it, and solve again for the end of a step.
-
-        At a target (`equation`) all tools count and pressures are renewed, so that without friction the state does not
-        depend on earlier steps; if this fails, the solution before is returned. Elsewhere tools with friction count,
-        and the control stays. Raise `Failure` without a state.
-        """
+        At a target (`equation`) all tools count and pressures are renewed: without friction the state is then
+        independent of earlier steps; if this fails, the solution before is returned. Elsewhere tools with friction
+        count, and the control stays. Raise `Failure` without a state."""
         constraint = equation or fixed(new.control)
         for sweep in range(LAGGED.max_solutions):
             late = any([c.correct(new.x[:self._n], new.control, equation is not None, sweep) for c in self._contacts])

@@ -122,13 +122,10 @@ class LaggedFriction(LaggedStick):
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the tractions at positions x, shape (n, 3), length, linearised at predicted positions.
-
-        sense: direction of sliding in the previous iteration, shape (n,), radians from the first to the second vector
-        of `_basis`; 0: none. A point whose slip reverses sticks for one iteration, else Newton's method would oscillate
-        over the narrow range of elastic slip. expected: positions and first-order distances from the previous
-        iteration; None: x.
-        """
+        """Compute the tractions at positions x, shape (n, 3), length, linearised at `expected` positions and distances
+        (None: x). sense: direction of sliding in the previous iteration, shape (n,), radians from the first to the
+        second vector of `_basis`; 0: none. A point whose slip reverses sticks for one iteration: Newton's method would
+        oscillate over the narrow range of elastic slip."""
         assert old is not None
         positions, zero = x if expected is None else expected.position, np.zeros(len(x))
         rows, distances = self.contact_distances(positions, old)

@@ -68,11 +68,7 @@ _SHORTENINGS = 50          # of a step until its predicted change of pressure is
 
 class LaggedApproach(Approach):
     """Lagged contact of one face during a step, see `formingx.contact.step_limit.Approach`.
-
-    Args:
-        face: the contact.
-        conducts: True if heat flows through points in contact, from the end of the step on.
-    """
+    conducts: True if heat flows through points in contact, from the end of the step on."""
 
     def __init__(self, face: FaceContact, conducts: bool):
         super().__init__(face, conducts)
@@ -227,11 +223,9 @@ class LaggedApproach(Approach):
 
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:
         """Replace the stored contact pressure by that of a state at a target, owned unknowns, shape (n,).
-
-        On tools in three dimensions it bounds friction in a step. Where a sheet slides, a fluid pressure also turns
-        into the normals of the tool with it. False if both agree to `LaggedLimits.max_target_difference` in the
-        area-weighted 1-norm, or if no pressure is stored.
-        """
+        It bounds friction in a step, and turns a fluid pressure into the normals of a tool on which the sheet slides.
+        False if both agree to `LaggedLimits.max_target_difference` in the area-weighted 1-norm, or if none is
+        stored."""
         face, law, variables = self.face, self.face.law, self.face.get()
         if variables is None or face.contact.sticks:
             return False
@@ -247,11 +241,8 @@ class LaggedApproach(Approach):
 
     def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
         """Return the arc length, at most `length`, in which the pressure changes by `LaggedLimits.max_pressure_change`.
-
         start, velocity: positions relative to the tool and d/ds, shape (n, c), length. The pressure is extrapolated
-        linearly, down to 0, so its change grows less than in proportion to the length. Without lagged friction the
-        result is `length`.
-        """
+        linearly, down to 0, so its change grows less than in proportion. Without lagged friction: `length`."""
         if not self.has_lagged_friction:
             return length
         law, history = self.face.law, self.face.history

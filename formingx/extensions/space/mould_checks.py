@@ -21,10 +21,8 @@ _INSIDE = 0.01             # distance of a held edge inside the mouth of a mould
 @register("start")
 def sizes(body: Any) -> Iterator[Finding]:
     """Yield a finding for each fixed tool over 4 times wider or narrower than the sheet, as in another unit.
-
-    A wide tool from an STL file is always reported. The flange of a swept profile is arbitrary, so a wide one is
-    reported if it is farther from the sheet than this is wide. A narrow tool is reported if it is a cavity.
-    """
+    A wide STL file is always reported, a wide swept profile, whose flange is arbitrary, if it is farther from the sheet
+    than this is wide. A narrow tool is reported if it is a cavity."""
     for contact in fixed_tools(body.scene):
         tool, sheet = contact.tool, whole_extent(body.scene)
         file = isinstance(tool, Triangulated)

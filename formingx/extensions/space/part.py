@@ -76,11 +76,9 @@ class SheetPart(PartNumbers):
 def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units: Units,
          planes: MirrorPlanes) -> SheetPart:
     """Return the numbers of the whole formed part, from the wall of the sheet in a state and its mirror planes.
-
-    trim: z of a plane, length, whose side away from the flat sheet is the part (the upper side of another surface), or
-    an outline around it. heights must be empty: `SheetWall.section` gives cuts. density: g/cm3. Raise `InputError` for
-    heights, for a trim that does not meet the part, or for a density that is not positive.
-    """
+    trim: z of a plane, length, whose side away from the flat sheet (upper side of another surface) is the part, or an
+    outline around it. heights must be empty (`SheetWall.section` gives cuts). density: g/cm3. Raise `InputError` for
+    heights, a trim that does not meet the part, or a density that is not positive."""
     if len(tuple(heights)):
         raise InputError("part: heights: in three dimensions use path.wall().section(point, normal)")
     share = np.ones(len(wall.wall)) if trim is None else _trimmed_share(wall, trim)

@@ -50,13 +50,7 @@ class PassedPoint(NamedTuple):
 
 
 class PassedTool:
-    """Test of one contact for parts of its tool on the wrong side of the sheet.
-
-    `SurfaceSides` says on which side of the sheet a point of the tool is.
-
-    Args:
-        face: the `FaceContact`.
-    """
+    """Test of one contact for parts of its tool on the wrong side of the sheet, by the sides of `SurfaceSides`."""
 
     def __init__(self, face: Any):
         self._face, surface = face, face.rule.surface
@@ -76,12 +70,9 @@ class PassedTool:
         self._points = points + self._size * _OFFSET @ self._sides.axes           # off the edges, which no ray must hit
 
     def deepest(self, fields: np.ndarray, control: float, limit: float, bridged_limit: float) -> PassedPoint | None:
-        """Return the point of the tool with the largest ratio, or None; collective.
-
-        Points whose ratio `bridged` is below its limit come last; with the limit 0 none is. It is found where the ratio
-        is above `limit`, and infinite elsewhere. fields: owned unknowns, shape (n,). A point is not examined if its
-        distance from the nearest node, over the median edge, is below `limit`.
-        """
+        """Return the point of the tool with the largest ratio above `limit`, or None; collective.
+        fields: owned, shape (n,). Points whose ratio `bridged` (computed above `limit`, else infinite) is below its
+        limit come last; with 0 none is. Points nearer to a node than `limit` times the median edge are not examined."""
         face, x, sides = self._face, self._points, self._sides
         shift = face.tool_displacement(control)
         P = self._whole.positions(fields) - shift

@@ -172,11 +172,9 @@ def _end_tangent(chord: np.ndarray, normal: np.ndarray, other: np.ndarray) -> np
 
 def control_points(corners: np.ndarray, normals: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the control points of patches, shape (m, 18, 3), length; corners, normals: shape (m, 3, 3).
-
-    Rows 4 k to 4 k + 3 lie on the boundary curve from corner k. Rows 12 + 2 k and 13 + 2 k are the two inner ones near
-    corner k, the first for the edge from k to k + 1, the second for the edge that ends in k. other: normals of the
-    neighbour across edge k at its two ends, shape (m, 3, 2, 3), equal to `normals` at smooth edges.
-    """
+    Rows 4 k to 4 k + 3 lie on the boundary curve from corner k. Rows 12 + 2 k and 13 + 2 k are inner ones near corner
+    k, for the edges from k to k + 1 and to k. other: normals of the neighbour across edge k at its two ends, shape (m,
+    3, 2, 3), equal to `normals` at smooth edges."""
     m = len(corners)
     P, curve, leg = np.zeros((m, 18, 3)), np.zeros((m, 3, 5, 3)), np.zeros((m, 3, 3, 3))
     for k in range(3):

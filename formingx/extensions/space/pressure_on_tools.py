@@ -85,11 +85,8 @@ class PressureOnTools:
 
     def refresh(self) -> None:
         """Update the coefficients of the virtual work to the present displacement of the sheet; collective.
-
-        The coefficients are the normals of the tools at the nodes in contact, their derivatives, the motions of these
-        tools by the control, and the least contact pressure of the nodes of each triangle. The pressures belong to the
-        last accepted state.
-        """
+        They are the normals of the tools at the nodes in contact, their derivatives, the motions of the tools by the
+        control, and the smallest contact pressure of each triangle's nodes, of the last accepted state."""
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)
         state = [part for face in surface.faces for part in (

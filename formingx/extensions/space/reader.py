@@ -24,13 +24,7 @@ from .wall import SheetWall, wall_of
 
 
 class SheetReader:
-    """Evaluation of a run of a sheet in three dimensions, which the methods of `Path` call.
-
-    It implements the interface `formingx.results.reader.Reader`.
-
-    Args:
-        path: the computed `Path`.
-    """
+    """Evaluation of a run of a sheet, which the methods of `Path` call, as a `formingx.results.reader.Reader`."""
 
     def __init__(self, path: Path):
         self._path = path

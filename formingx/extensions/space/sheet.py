@@ -198,14 +198,8 @@ def chords(edges: list[Edge], caller: str) -> np.ndarray:
 
 
 class _Size:
-    """Edge length of triangles as a function for gmsh, which ignores exceptions.
-
-    Args:
-        size: edge length, a number or a function of (x, y).
-
-    Attributes:
-        refused: the first InputError of `size`, or None.
-    """
+    """Edge length of triangles, a number or a function of (x, y), for gmsh, which ignores exceptions: the first is
+    `refused`."""
 
     def __init__(self, size: Any):
         self._size = size

@@ -82,11 +82,9 @@ _LARGEST_MITRE = 3.0
 
 def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the closed surface of the whole part in a state, completed by mirror images.
-
     Points, shape (n, 3), length; triangles, outward, shape (m, 3); wall over reference wall there, shape (n,). Half of
-    the wall lies on each side of the mid-surface. Nodes are moved along their normals, at folds by so much more that
-    the volume is that of the walls.
-    """
+    the wall lies on each side of the mid-surface: nodes move along their normals, farther at folds, to the volume of
+    the walls."""
     wall, planes = wall_of(path, state), path.scene.symmetry
     on = [np.abs(wall.reference_points[:, plane.axis] - plane.position) < planes.near for plane in planes.planes]
     corners = wall.deformed_points[wall.triangles]
@@ -201,14 +199,8 @@ def _parts_of_tools(path: Any, states: list[Any], units: Units) -> str:
 
 
 def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
-    """Return two charts of the cut through the thinnest triangle along the longer side of the part.
-
-    The first has the shape of the cut, the second the wall along it.
-
-    Args:
-        wall: the wall in the last state (`SheetWall`).
-        units: units of the labels.
-    """
+    """Return two charts of the cut through the thinnest triangle along the longer side of the part: its shape, and the
+    wall."""
     thinnest = wall.middle[int(np.argmin(wall.wall))]
     axis = int(np.argmax(np.ptp(wall.deformed_points[:, :2], axis=0)))
     normal = np.eye(3)[1 - axis]

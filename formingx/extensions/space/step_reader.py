@@ -19,11 +19,9 @@ _SMALLEST_TRIANGLE = 2e-3  # the same; at the tip of a cone the curvature would 
 
 def read_step(name: str, size: float | None, angle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices, shape (n, 3), mm, triangles, shape (m, 3), and exact normals, shape (m, 3, 3), of a STEP file.
-
-    Triangles are counter-clockwise from outside, normals at their corners point out of the solid. gmsh converts lengths
-    to mm. size: largest edge, mm; None: a quarter of the extent. angle: largest turn within a triangle, degrees. Raise
-    `InputError` if gmsh cannot read the file, or if it has no solid.
-    """
+    Triangles are counter-clockwise from outside, normals point out of the solid, and gmsh converts lengths to mm. size:
+    largest edge, mm; None: a quarter of the extent. angle: largest turn within a triangle, degrees. Raise `InputError`
+    if gmsh cannot read the file, or if it has no solid."""
     options = {"General.NumThreads": 1.0, "Mesh.MeshSizeFromCurvature": 360.0 / angle,
                "Mesh.MeshSizeExtendFromBoundary": 0.0}
     if not os.path.isfile(name):

@@ -136,12 +136,7 @@ def _evaluated(forms: Any, expression: Any, cells: np.ndarray, places: Any) -> n
 
 class _Layer:
     """Stresses of one layer in the present fields, entries 11, 22 and 12 in the axes of the deformed triangle.
-
-    Args:
-        forms: formulation of the sheet.
-        terms: its `MaterialTerms`.
-        cells: local numbers of the owned cells, shape (m,).
-    """
+    cells: local numbers of the owned cells, shape (m,)."""
 
     def __init__(self, forms: Any, terms: Any, cells: np.ndarray):
         self._forms, self._terms, self._cells = forms, terms, cells

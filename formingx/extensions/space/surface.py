@@ -61,10 +61,7 @@ Across a sheet of 75 degrees between its faces, in which a tenth has relaxed, 5 
 
 class Surface(Formulation):
     """Residual forms of a membrane in three dimensions; the only unknown field is the displacement.
-
-    Attributes:
-        thicknesses: {layer: reference thickness as a `Function`, length}.
-    """
+    thicknesses: {layer: reference thickness as a `Function`, length}."""
 
     singular_unloaded = True
     _on_tools: PressureOnTools | None = None
@@ -235,10 +232,8 @@ class Surface(Formulation):
     @property
     def _directions(self) -> tuple[Any, Any]:
         """Unit vectors in the surface to which laws refer (UFL, shape (3,) each).
-
-        On a flat sheet they point along x and along y. On another surface they point upwards, along the steepest line,
-        and horizontally. There a horizontal triangle has the directions of a flat sheet.
-        """
+        They are x and y on a flat sheet and on a horizontal triangle, else the steepest line upwards and the
+        horizontal."""
         x, y, z = (ufl.as_vector([float(i == k) for k in range(3)]) for i in range(3))
         if self.mesh.flat:
             return x, y

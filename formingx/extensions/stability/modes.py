@@ -220,12 +220,8 @@ class Modes:
 
     def _lanczos(self, number: int) -> tuple[Array, Array]:
         """Return the eigenvalues of K x = value M x nearest to 0, ascending, and their modes, shape (number, n).
-
-        K is the second variation, M the lumped mass, which is 0 for pressures. So all vectors lie in the range of K^-1
-        M. Rigid motions are removed, and vectors are orthogonalised fully.
-
-        number: number of eigenvalues.
-        """
+        K is the second variation, M the lumped mass, which is 0 for pressures, so all vectors lie in the range of K^-1
+        M. Rigid motions are removed, and vectors are orthogonalised fully."""
         variation = self.variation
         removed: list[Array] = []
         for mode in variation.rigid_motions:

@@ -44,12 +44,8 @@ class StudyRun:
 
 
 class Task(NamedTuple):
-    """Task of one process: it runs the user's function for a set of values, and evaluates the measures of the run.
-
-    Attributes:
-        build: function of the variables that returns a path.
-        measures: {name: function of the path, or name of a column}.
-    """
+    """Task of one process: it runs the user's function `build` for a set of values, and evaluates the measures of the
+    run. measures: {name: function of the path, or name of a column}."""
 
     build: Callable[..., Any]
     measures: dict[str, Measure]

@@ -74,13 +74,7 @@ class Depth(NamedTuple):
 
 class AdmissibilityCheck:
     """Check of the states of one problem; an inadmissible state satisfies the equations, but no real body can have it.
-
-    Examples are states with inverted elements, with a face inside a tool, or with wrong tool forces, because contact
-    points penetrate the tool too far.
-
-    Args:
-        problem: the discretised problem.
-    """
+    Examples are inverted elements, a face inside a tool, or tool forces of points that penetrate the tool too far."""
 
     def __init__(self, problem: Any):
         self._problem, self._solid = problem, problem.scene.model.solid
@@ -91,17 +85,10 @@ class AdmissibilityCheck:
             self._reference_lengths = _lengths(self._outline.reference_edges)
 
     def findings(self, state: State) -> list[Finding]:
-        """Return findings on penetration of the tools in an admissible state; collective.
-
-        Args:
-            state: the state.
-
-        Returns:
-            The findings; empty if all penetrations are small. In a section a finding is a warning: penetration changes
-            a tool force by more than 0.2 % (`WARNED_ERROR`), or the face lies deeper in a tool than a tenth of the
-            thickness (`CUT`). In three dimensions a finding is "serious": a contact point lies deeper than a tenth
-            of `FaceContact.reference_length`.
-        """
+        """Return findings on penetration of the tools in an admissible state, empty if all are small; collective.
+        A warning in a section: penetration changes a tool force by more than 0.2 % (`WARNED_ERROR`), or the face is
+        deeper than a tenth of the thickness (`CUT`). "serious" in three dimensions: a point deeper than a tenth of
+        `FaceContact.reference_length`."""
         if not self._solid:
             deepest = self._deepest_points(state, lambda contact: CUT * contact.reference_length)
             return [Finding("serious", deep.name, f"{deep.words}: shorter steps (StepControl(length=...)), or a larger"
@@ -172,11 +159,8 @@ class AdmissibilityCheck:
 
     def _deepest(self, edges: np.ndarray, lengths: np.ndarray, state: State, on_face: bool) -> Iterator[Depth]:
         """Yield for each active tool of a section the deepest point of the boundary in it, if deeper than allowed.
-
-        Edges (m, 3, 2) have first end, last end and middle, lengths (m,). A point of an edge is nearer than max |dx/ds|
-        / 4 to one of these, so most edges are skipped. `on_face` takes only the face towards the tool, with the limit
-        `CUT`.
-        """
+        Edges (m, 3, 2) have first end, last end and middle, lengths (m,); no point is farther from these than max
+        |dx/ds| / 4, so most edges are skipped. `on_face` takes only the face towards the tool, with the limit `CUT`."""
         a, b, middle = edges.transpose(1, 0, 2)
         slopes = np.linalg.norm([4 * middle - 3 * a - b, a - 4 * middle + 3 * b], axis=-1)
         for contact, face in zip(self._problem.contacts, self._faces):

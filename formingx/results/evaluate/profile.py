@@ -267,10 +267,8 @@ def refined(line: np.ndarray, parts: int = 6) -> np.ndarray:
 
 def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return for each node of a face the point at which its normal meets the other face, shape (n, 2), length.
-
     Both faces have nodes end, middle, end, ... in the same direction, (n, 2) and (m, 2). Ends are opposite ends; a
-    normal that misses takes the nearest end.
-    """
+    normal that misses takes the nearest end."""
     a, m, b = line[:-1:2], line[1::2], line[2::2]          # tangents of the parabola through an edge's nodes
     tangent = np.zeros_like(line)
     tangent[1::2] = b - a

@@ -35,11 +35,8 @@ class Resticking(NamedTuple):
 
 
 def furthest(path: Any) -> Resticking | None:
-    """Return the contact point with the largest shift of its sticking position on a tool; collective.
-
-    It separates and sticks again elsewhere, on the last mesh. The shift over its tributary length is an upper bound of
-    the wall error by step lengths. None without any.
-    """
+    """Return the contact point that separates and sticks elsewhere, with the largest shift on the last mesh; None;
+    collective. The shift over its tributary length is an upper bound of the wall error by step lengths."""
     found = []
     for number, contact in enumerate(c for c in path.problem.contacts if c.has_history):   # contacts come first
         definition = contact.contact

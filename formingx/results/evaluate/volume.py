@@ -48,11 +48,9 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
 
 
 def extreme_ratio(path: Any) -> list[Finding]:
-    """Return a finding in a list if J is not between 1/2 and 2 somewhere in the last state; else an empty list.
-
-    J is examined at quadrature points, also of the next higher degree, and at middles of edges. J <= 0 away from clamps
-    is a warning. Collective.
-    """
+    """Return a finding in a list if J is not between 1/2 and 2 somewhere in the last state; else an empty list;
+    collective. J is examined at quadrature points, also of the next higher degree, and at middles of edges. J <= 0 away
+    from clamps is a warning."""
     furthest = path.problem.extreme_volume_ratio(path.last)
     J = 1.0 if furthest is None else furthest.value
     if 1 / _MAX_VOLUME_RATIO < J < _MAX_VOLUME_RATIO:

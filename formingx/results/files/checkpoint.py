@@ -57,14 +57,8 @@ from .progress import progress
 
 
 class Checkpoint:
-    """Writer of the checkpoint folder of one run.
-
-    Creating it is collective. A folder of another run, or with other files, is an InputError; one that cannot be
-    written an OSError.
-
-    Attributes:
-        folder: the folder (`pathlib.Path`).
-    """
+    """Writer of the checkpoint folder of one run, a `pathlib.Path`; creating it is collective.
+    A folder of another run, or with other files, is an InputError; one that cannot be written an OSError."""
 
     def __init__(self, folder: Any, path: Any):
         self.folder, self._path, self._comm = file_path("checkpoint", folder), path, path.problem.comm

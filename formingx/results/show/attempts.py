@@ -10,27 +10,16 @@ log = logging.getLogger("formingx")
 
 
 class Attempts:
-    """Parts of a report that were tried, and findings on the parts that failed.
-
-    Args:
-        refusals: classes of errors that are raised, because they refuse an argument of the user.
-
-    Attributes:
-        findings: a warning for each part that failed.
-    """
+    """Parts of a report that were tried, and findings: a warning for each part that failed.
+    Errors of the classes `refusals` are raised, because they refuse an argument of the user."""
 
     def __init__(self, *refusals: type[Exception]):
         self._refusals = refusals
         self.findings: list[Finding] = []
 
     def make(self, name: str, draw: Callable[[], Any], fallback: Any) -> Any:
-        """Return the result of a function, or a fallback if it fails; the error becomes a finding.
-
-        Args:
-            name: name of the part, for the finding, such as "the picture of the wall".
-            draw: function without arguments that makes the part.
-            fallback: content in place of a part that failed.
-        """
+        """Return the result of `draw`, or a fallback if it fails; the error becomes a finding on `name`, such as "the
+        picture"."""
         try:
             return draw()
         except self._refusals:

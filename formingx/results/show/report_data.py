@@ -320,11 +320,9 @@ def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: i
 
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
     """Return the progress of a process in n states, from 0 to 1, shape (n,).
-
     It is proportional to process time; in stages without time, a control over its range counts a quarter of the total.
     In a run without time, a step adds the mean change of controls over their ranges, and the mean displacement of the
-    middle line over the sum of all. The sum is scaled to 1.
-    """
+    middle line over the sum of all."""
     n = len(profiles)
     steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
     driven = [measures[c] for c in measures if c.endswith(CONTROLS)]

@@ -175,11 +175,8 @@ class ColumnConduction:
     def _solve(self, T: np.ndarray, forced: np.ndarray, c: float, laws: Sequence[Any],
                responses: Sequence[Any]) -> tuple[np.ndarray, list[np.ndarray]]:
         """Return the change of the columns in an implicit stage, shape (n, m), and the fluxes of the laws, (n,) each.
-
-        forced: right-hand side without fluxes at the faces, shape (n, m). In terms of the modes the matrix is diagonal.
-        A flux at a face changes both faces by the compliance Z of the column; Newton's method finds the temperatures of
-        the faces.
-        """
+        forced: right-hand side without fluxes at the faces, shape (n, m). In terms of modes the matrix is diagonal; a
+        flux changes both faces by the compliance Z. Newton's method finds the temperatures of the faces."""
         modes, ends = self.basis.modes, [0, len(self.basis.depths) - 1]
         decay = 1 / (1 + c * np.outer(1 / self.thickness**2, self.basis.rates))
         free = decay * ((forced / self._share[:, None]) @ modes)                 # modes of the change without fluxes
@@ -271,11 +268,7 @@ class _FaceLaw:
 
 
 class _LinearLaw:
-    """Flux of differences of temperature at one face.
-
-    Attributes:
-        point: number of the point of a column at the face.
-    """
+    """Flux of differences of temperature at one face; `point` is the number of the point of a column there."""
 
     def __init__(self, point: int, slope: np.ndarray):
         self.point, self._slope = point, slope
