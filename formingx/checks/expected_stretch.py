@@ -26,11 +26,9 @@ def _cap_stretch(target: Any, radius: float) -> float | None:
 
     The points of the thin disc move at right angles to the successive caps, so
 
-    .. math::
-        \lambda = 1 + (H / a)^2
+    .. math:: \lambda = 1 + (H / a)^2
 
-    The target is a pole stretch, a pole height or an enclosed volume; for any other None is returned.
-    """
+    The target is a pole stretch, a pole height or an enclosed volume; for any other None is returned."""
     if target.name == "pole_stretch":
         return float(target.value)
     height = abs(target.value) / radius

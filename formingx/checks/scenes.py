@@ -193,8 +193,7 @@ def _volume_penalty(body: SizedBody) -> Iterator[Finding]:
     At a stretch lambda the pressure is about mu lambda^2, with the shear modulus mu, and the bulk modulus is 8 mu/eps.
     So the relative change of volume is about
 
-    .. math::
-        \epsilon \lambda^2 / 8
+    .. math:: \epsilon \lambda^2 / 8
     """
     model = body.scene.model
     if not model.solid:

@@ -96,8 +96,7 @@ def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callab
 
     .. math:: -k T_s'' = q, \qquad k T_s'(0) = h_0 (T_s(0) - T_{air,0}), \qquad -k T_s'(d) = h_1 (T_s(d) - T_{air,1})
 
-    h and air have values of both faces; q is a function of x, power/length^3, or None.
-    """
+    h and air have values of both faces; q is a function of x, power/length^3, or None."""
     d, k = slab.thickness, slab.conductivity
     nodes, weights = np.polynomial.legendre.leggauss(60)
 
@@ -169,8 +168,7 @@ def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
 
     .. math:: \sigma_k = \theta_k + (\theta_k \cot\theta_k - 1) \cot\theta_k, \quad \theta_k = \frac{k \pi}{n}
 
-    (Abate and Valko 2004.) `transformed` is a function of a complex number s that returns the m transforms.
-    """
+    (Abate and Valko 2004.) `transformed` is a function of a complex number s that returns the m transforms."""
     theta = np.arange(1, n) * np.pi / n
     r = 2 * n / (5 * t)
     cot = 1 / np.tan(theta)

@@ -257,8 +257,7 @@ def _tensions(t: float, l2: float) -> tuple[float, float]:
     .. math:: T_1 = \frac{\lambda_1}{\lambda_2} - (\lambda_1 \lambda_2)^{-3}, \qquad
               T_2 = \frac{\lambda_2}{\lambda_1} - (\lambda_1 \lambda_2)^{-3}
 
-    Tensions are per deformed length, over 2 c10 h0 (h0: reference thickness).
-    """
+    Tensions are per deformed length, over 2 c10 h0 (h0: reference thickness)."""
     l1 = meridional_stretch(t * l2, l2)
     return l1, l2 / l1 - (l1 * l2)**-3
 
@@ -293,7 +292,6 @@ def _free_derivatives(R: float, r: float, z: float, phi: float, t: float) -> lis
     .. math:: \frac{d\phi}{ds} = -\frac{T_2}{T_1} \frac{\sin\phi}{r}, \qquad
               \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r}, \qquad ds = \lambda_1 dR
 
-    Lengths are over the reference radius of the membrane, t is T1 over 2 c10 h0, and phi is in radians.
-    """
+    Lengths are over the reference radius of the membrane, t is T1 over 2 c10 h0, and phi is in radians."""
     l1, t2 = _tensions(t, r / R)
     return [1, l1 * np.cos(phi), l1 * np.sin(phi), -l1 * t2 / t * np.sin(phi) / r, l1 * (t2 - t) * np.cos(phi) / r]

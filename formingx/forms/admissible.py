@@ -39,10 +39,9 @@ class Admissible:
 
     They are evaluated at the quadrature points of the energy, at points of the next degree, and at edge midpoints.
 
-    .. math::
-        \lambda_\theta = 1 + u_r / R, \qquad
-        d = \left(1 + \frac{\partial u_r}{\partial R}\right) \left(1 + \frac{\partial u_z}{\partial Z}\right)
-            - \frac{\partial u_r}{\partial Z} \frac{\partial u_z}{\partial R}
+    .. math:: \lambda_\theta = 1 + u_r / R, \qquad
+              d = \left(1 + \frac{\partial u_r}{\partial R}\right) \left(1 + \frac{\partial u_z}{\partial Z}\right)
+                  - \frac{\partial u_r}{\partial Z} \frac{\partial u_z}{\partial R}
 
     On the axis the hoop stretch is its limit, :math:`1 + \partial u_r / \partial R`. A membrane has a hoop stretch
     only. The constructor computes all arrays that do not depend on the state.

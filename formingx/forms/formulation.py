@@ -323,8 +323,7 @@ class Formulation(ABC):
     def viscosity(self) -> Any:
         r"""Return the bilinear form of a viscous stress, scaled like the residual (UFL, dimensionless).
 
-        .. math::
-            \frac{1}{V} \int \dot F : \delta F \, dV
+        .. math:: \frac{1}{V} \int \dot F : \delta F \, dV
         """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         potential = ufl.inner(F, F) / 2 * self.weight / self.constant(self.volume)

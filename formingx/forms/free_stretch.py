@@ -17,8 +17,7 @@ class FreeStretch:
 
     The deformation gradient is split into an elastic and an isotropic thermal part:
 
-    .. math::
-        F = J_T^{1/3} F_e
+    .. math:: F = J_T^{1/3} F_e
 
     J_T is the volume ratio of the free thermal expansion. The stretch is 1 in layers without expansion.
 

@@ -74,12 +74,10 @@ class Probe:
     def stretch_row(self) -> tuple[np.ndarray, float]:
         r"""Return a row, owned entries, shape (n,), and a power for the in-plane stretch at the pole.
 
-        .. math::
-            \lambda = (1 + \text{row} \cdot x)^{\text{power}}
+        .. math:: \lambda = (1 + \text{row} \cdot x)^{\text{power}}
 
         The two points lie on the axis, the lower one first. Incompressibility gives the in-plane stretch from that of
-        the thickness: the power is -1/2 if axisymmetric, -1 in plane strain.
-        """
+        the thickness: the power is -1/2 if axisymmetric, -1 in plane strain."""
         (_, low), (_, high) = self.points
         row = self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low)
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
@@ -87,11 +85,9 @@ class Probe:
     def row(self, factors: np.ndarray) -> np.ndarray:
         r"""Return a vector, owned entries, whose product with x is a weighted sum of the points' displacements.
 
-        .. math::
-            \text{row} \cdot x = \frac{1}{L} \sum_{i,c} w_{ic} u_{ic}
+        .. math:: \text{row} \cdot x = \frac{1}{L} \sum_{i,c} w_{ic} u_{ic}
 
-        factors: weights w_ic of component c of point i, shape (n, components). L is `forms.length`.
-        """
+        factors: weights w_ic of component c of point i, shape (n, components). L is `forms.length`."""
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
@@ -172,8 +168,7 @@ class MidSurfaceProbe(Probe):
     def stretch_row(self) -> tuple[np.ndarray, float]:
         r"""Return the row, shape (n,), and the power 1 for the in-plane stretch at the pole of a membrane.
 
-        .. math::
-            1 + \frac{\partial u_r}{\partial R} = 1 + \text{row} \cdot x
+        .. math:: 1 + \frac{\partial u_r}{\partial R} = 1 + \text{row} \cdot x
         """
         row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
         return row, 1.0

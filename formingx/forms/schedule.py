@@ -12,8 +12,7 @@ from typing import Any
 class StepData:
     r"""Amplitudes of loads, supports and contacts (`Scene.items`) as linear functions of the control.
 
-    .. math::
-        a_i = \mathrm{base}_i + \mathrm{rate}_i \, \lambda
+    .. math:: a_i = \mathrm{base}_i + \mathrm{rate}_i \, \lambda
 
     :math:`\lambda` is the control; amplitudes are dimensionless. The last entry of `base` and `rate` belongs to the
     process time.

@@ -139,12 +139,10 @@ class Solid(Formulation):
                          density: Any = MaterialTerms.step_energy) -> list[tuple[Any, dict]]:
         r"""Return [(energy per reference volume (UFL, stress), quadrature metadata)] of layers of a body.
 
-        .. math::
-            W(F) - \sigma_0 \ln J + p (J - 1)
+        .. math:: W(F) - \sigma_0 \ln J + p (J - 1)
 
         W is the strain energy, J the volume ratio without thermal expansion, p a pressure field, and :math:`\sigma_0`
-        the stress dW/dF11 at F = I. A penalty model has a penalty in place of :math:`p (J - 1)`.
-        """
+        the stress dW/dF11 at F = I. A penalty model has a penalty in place of :math:`p (J - 1)`."""
         return self.elastic_densities(names, self.elastic(F), ufl.split(self.w)[1:], density)
 
     def elastic_densities(self, names: list[str], F: Any, pressures: Any, density: Any = MaterialTerms.step_energy

@@ -116,11 +116,9 @@ class StepError:
 class _Stress:
     r"""Deviatoric Kirchhoff stress of a material at the quadrature points of the energy.
 
-    .. math::
-        \tau = \mathrm{dev} \left( \frac{\partial W}{\partial F} F^T \right)
+    .. math:: \tau = \mathrm{dev} \left( \frac{\partial W}{\partial F} F^T \right)
 
-    W is an energy of the material per reference volume, and F the deformation gradient without thermal expansion.
-    """
+    W is an energy of the material per reference volume, and F the deformation gradient without thermal expansion."""
 
     def __init__(self, forms: Any, terms: Any, energy: Callable):
         F = ufl.variable(forms.elastic_F)

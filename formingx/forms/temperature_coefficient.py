@@ -16,8 +16,7 @@ class TemperatureCoefficient:
     The temperature is known at the beginning :math:`t_0` of a step. Within the step the coefficient is extrapolated
     with its logarithmic rate in the previous step:
 
-    .. math::
-        f(t) = f_0 \exp(a (t - t_0)), \qquad a = \frac{\ln f_0 - \ln f_{-1}}{t_0 - t_{-1}}
+    .. math:: f(t) = f_0 \exp(a (t - t_0)), \qquad a = \frac{\ln f_0 - \ln f_{-1}}{t_0 - t_{-1}}
 
     The error is of second order in the step length, and f keeps its sign.
 

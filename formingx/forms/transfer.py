@@ -23,8 +23,7 @@ class MovingLeastSquares:
     A quadratic polynomial p is fitted around each target point y to the k nearest values :math:`f_i` at :math:`x_i`
     (Lancaster and Salkauskas, Mathematics of Computation 37, 1981):
 
-    .. math::
-        \min_p \sum_{i=1}^{k} \frac{(p(x_i) - f_i)^2}{|x_i - y|^4}
+    .. math:: \min_p \sum_{i=1}^{k} \frac{(p(x_i) - f_i)^2}{|x_i - y|^4}
 
     Quadratic functions are reproduced exactly; other functions have an error of third order in the distance of the
     points. A value at a point of both sets is kept. At a discontinuity the fit overshoots by less than a tenth of the
@@ -140,11 +139,9 @@ def fitted_tensors(interpolation: MovingLeastSquares, values: np.ndarray, source
 
     The interpolated quantity is the logarithm relative to the current configuration, so stresses stay continuous:
 
-    .. math::
-        \ln(F^{-T} C F^{-1})
+    .. math:: \ln(F^{-T} C F^{-1})
 
-    values: shape (m, 4); source_F, target_F: shape (m, 3, 3) and (n, 3, 3). The result has the shape (n, 4).
-    """
+    values: shape (m, 4); source_F, target_F: shape (m, 3, 3) and (n, 3, 3). The result has the shape (n, 4)."""
     seen = np.linalg.solve(np.swapaxes(source_F, 1, 2), _matrices(values))
     w, v = np.linalg.eigh(np.swapaxes(np.linalg.solve(np.swapaxes(source_F, 1, 2), np.swapaxes(seen, 1, 2)), 1, 2))
     w, v = np.linalg.eigh(interpolation.fitted(np.einsum("nij,nj,nkj->nik", v, np.log(w), v)))

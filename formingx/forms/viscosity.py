@@ -16,8 +16,7 @@ class Viscosity:
 
     The matrix V belongs to a viscosity of 1, and the methods receive the viscosity eta (dimensionless):
 
-    .. math::
-        w^T V \, dx = \frac{1}{V_0} \int dF : \delta F \, dV_0
+    .. math:: w^T V \, dx = \frac{1}{V_0} \int dF : \delta F \, dV_0
 
     dF and :math:`\delta F` are the deformation gradients of dx and of virtual unknowns w, V_0 is the reference volume.
     Constrained unknowns neither cause nor receive forces.

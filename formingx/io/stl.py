@@ -12,12 +12,10 @@ from .output import replace
 def volume(points: np.ndarray, triangles: np.ndarray) -> float:
     r"""Return the volume inside closed surfaces of triangles with the corners a, b and c, length^3.
 
-    .. math::
-        V = \frac{1}{6} \sum a \cdot (b \times c)
+    .. math:: V = \frac{1}{6} \sum a \cdot (b \times c)
 
     The corners have shape (n, 3), length, the triangles (m, 3). Clockwise ones, seen from outside, give a negative
-    volume.
-    """
+    volume."""
     a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
     return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 

@@ -34,8 +34,7 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
     Branches have relaxation times (branches,), and f maps w to f(w), both (branches, 3). Times and stretches have shape
     (n,); two stretches at one time are a jump, and `between` has a constant rate, "stretch" or "strain". The result has
-    shape (n, branches, 3); a ConvergenceError says where the integration stopped.
-    """
+    shape (n, branches, 3); a ConvergenceError says where the integration stopped."""
     from scipy.integrate import solve_ivp
     check_name("elastic_strains: mode", mode, MODES)
     direction = np.array([1, MODES[mode], -1 - MODES[mode]])

@@ -115,8 +115,7 @@ def in_plane_stretches(mode: str, stretches: Any) -> np.ndarray:
     .. math:: l_1 = l, \qquad l_2 = l^k
 
     Stretches l have shape (n,), and k is -1/2 ("uniaxial"), 0 ("pure_shear") or 1 ("equibiaxial"); the result has shape
-    (2, n).
-    """
+    (2, n)."""
     l = np.asarray(stretches, float)
     return np.stack([l, l ** MODES[mode]])
 

@@ -46,8 +46,7 @@ class FreeInflation:
         P are nominal stresses, h0 is the reference thickness and R the reference radius. For several layers P h0 is a
         sum over the layers.
 
-        Hoop stretches have shape (n,); pressures beyond the largest stretch of a material are infinite.
-        """
+        Hoop stretches have shape (n,); pressures beyond the largest stretch of a material are infinite."""
         low, high = np.full_like(hoop, 0.5), hoop + 1.0
         for _ in range(_HALVINGS):
             axial = (low + high) / 2
@@ -68,8 +67,7 @@ class FreeInflation:
         For several layers P h0 is a sum over the layers. The maximum of the pressure is 2 to 3 % below the maximum for
         a hinged neo-Hookean disc.
 
-        Stretches l have shape (n,), 1 or larger; pressures beyond the largest stretch of a material are infinite.
-        """
+        Stretches l have shape (n,), 1 or larger; pressures beyond the largest stretch of a material are infinite."""
         force = self._forces(in_plane_stretches("equibiaxial", stretch))[0]
         found = 4 * np.sqrt(stretch**2 - 1) * force / (self._radius * stretch**3)
         return np.where(np.isfinite(found), found, np.inf)

@@ -95,8 +95,7 @@ class Viscoelastic(GeneralisedMaxwell):
 
         A step of first order has G = Cv_n and x' = x.
 
-        C_n is `past`, None for a step of first order, Cv_n is `Cv`, and x is the step over the relaxation time.
-        """
+        C_n is `past`, None for a step of first order, Cv_n is `Cv`, and x is the step over the relaxation time."""
         if past is None:
             return Cv, x
         return plus(Cv, past, x / 2), x / 2 * (1 + x / 3 * inner(past, cofactor(Cv)))
@@ -157,8 +156,7 @@ class TransientNetwork(GeneralisedMaxwell):
         The factor s/(1 + s) is multiplied by 2 - s/2 for s from 2 to 4, and is 0 for larger s, because BDF2 would be
         unstable. It is also 0 where the tensor M of the step (`_past_tensor`) would not be positive definite.
 
-        `internal` has {name: internal variable at the beginning of the step (UFL, shape () or (4,))}.
-        """
+        `internal` has {name: internal variable at the beginning of the step (UFL, shape () or (4,))}."""
         s, change = time_step * internal["pace"], entries(internal["change"])
         near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow faster make BDF2 unstable
         small = ufl.lt(-inner(entries(internal["C"]), change), 1)       # else M is not positive definite
@@ -194,8 +192,7 @@ class TransientNetwork(GeneralisedMaxwell):
         .. math:: M = e^{-x} A_n + (m - e^{-x} + p) C_n^{-1} + p s (C_n^{-1} - C_{n-1}^{-1}), \qquad
                   m = \frac{1 - e^{-x}}{x}, \qquad p = \frac{x - 2 + (x + 2) e^{-x}}{x^2} \, \frac{s}{1 + s}
 
-        `past` is the result of `_past`, A is A_n, and x is the step over the relaxation time.
-        """
+        `past` is the result of `_past`, A is A_n, and x is the step over the relaxation time."""
         before, change, share = past
         decay, p = ufl.exp(-x), share * _parabola_weight(x)
         return tuple(decay * a + (_mean_decay(x) - decay + p) * c + p * d for a, c, d in zip(A, before, change))
@@ -218,8 +215,7 @@ def _parabola_weight(x: Any) -> Any:
     .. math:: \frac{x - 2 + (x + 2) e^{-x}}{x^2}
 
     Here x is the length of the step over the relaxation time. The other factor of p is s/(1 + s), with the ratio s of
-    the step to the previous one.
-    """
+    the step to the previous one."""
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)

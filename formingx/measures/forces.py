@@ -18,8 +18,7 @@ def positive_direction(contact: Any) -> np.ndarray:
     .. math:: -\frac{m}{|m|}
 
     The result has shape (components,), and is +Z for a fixed tool. m is the motion per travel
-    (`Contact.travel_vector`).
-    """
+    (`Contact.travel_vector`)."""
     up = np.eye(contact.tool.components)[-1]
     return up if contact.direction is None else -contact.travel_vector / np.linalg.norm(contact.travel_vector)
 

@@ -64,8 +64,7 @@ class Linear(Quantity):
 
     Here c is the residual of its equation for the target value q*.
 
-    The row a has locally owned entries, shape (n,). Values of f are in the user's units; default is the identity.
-    """
+    The row a has locally owned entries, shape (n,). Values of f are in the user's units; default is the identity."""
 
     def __init__(self, problem, row, offset=0.0, function=lambda y: y, inverse=lambda v: v):
         self._row, self._offset, self._function, self._inverse = problem.x.duplicate(), offset, function, inverse
@@ -90,8 +89,7 @@ class Form(Quantity):
 
     Here c is the residual of its equation for the target value q*.
 
-    I is a dimensionless UFL form of rank 0; s and q_0 are in the user's units.
-    """
+    I is a dimensionless UFL form of rank 0; s and q_0 are in the user's units."""
 
     def __init__(self, problem, form, scale, offset=0.0):
         self._problem, self._scale, self._offset = problem, scale, offset

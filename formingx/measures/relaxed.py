@@ -23,8 +23,7 @@ class PoleStressRatio:
     .. math:: \sigma = \sqrt{\tfrac{3}{2}} \, |\mathrm{dev}(P F^T)|, \qquad P = \frac{\partial W}{\partial F}
 
     W is `Material.stored_energy` for the present stress, `Material.equilibrium_energy` for the relaxed stress. In the
-    equibiaxial state of a pole, sigma is the stress along the sheet minus the stress through its thickness.
-    """
+    equibiaxial state of a pole, sigma is the stress along the sheet minus the stress through its thickness."""
 
     def __init__(self, problem: Any):
         forms = problem.forms

@@ -280,8 +280,7 @@ def bind_pole_stretch(problem: Any) -> Quantity:
     .. math:: \lambda = (h / h_0)^{-1/2} \text{ (axisymmetric)}, \qquad \lambda = (h / h_0)^{-1} \text{ (plane strain)}
 
     Here h is the current thickness on the axis, h_0 the thickness on the first mesh of the run. In a membrane the
-    stretch is 1 + du_r/dR.
-    """
+    stretch is 1 + du_r/dR."""
     low, high = _pole(problem)
     pole = probe(problem, [(0.0, low), (0.0, high)])
     row, power = pole.stretch_row()
@@ -321,8 +320,7 @@ def swept_volume(problem: Any) -> Any:
     a(t u) is the area vector of the face at the displacement t u. For an axisymmetric body it is of degree 2 in t, so
     the two-point Gauss rule in t is exact.
 
-    A scene without a controlled pressure with a face is an InputError.
-    """
+    A scene without a controlled pressure with a face is an InputError."""
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
     if driven is None or driven.on is None:
         what = "no driven pressure whose face would enclose" if driven is None else f"{driven!r}, which has no face for"
@@ -357,6 +355,5 @@ def is_met(target: Target, size: float, value: float) -> bool:
 
     .. math:: |v - v^*| \le 10^{-12} \max(|v|, |v^*|, size)
 
-    `size` is the scale of the quantity, in the user's units (`Quantity.size`).
-    """
+    `size` is the scale of the quantity, in the user's units (`Quantity.size`)."""
     return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)

@@ -149,8 +149,7 @@ def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]
 
     .. math:: s(R) = \min_i \left[s_i + (1 - s_i) \frac{|R - R_i|}{D}\right]
 
-    Each R_i is the end of an element; fewer elements than intervals between the R_i are an InputError.
-    """
+    Each R_i is the end of an element; fewer elements than intervals between the R_i are an InputError."""
     radii, small = np.array(list(sizes)), np.array(list(sizes.values()))
     ends = np.unique([low, *radii, high])
     if along < len(ends) - 1:

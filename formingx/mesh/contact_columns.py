@@ -186,8 +186,7 @@ def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside
     The second error is that of a convex fillet over which the sheet is drawn. A wall thicker than the radius counts as
     one as thick as the radius: such an edge is reported.
 
-    `through` is n, and `inside` is False for a lip beside a constrained end.
-    """
+    `through` is n, and `inside` is False for a lip beside a constrained end."""
     relative = min(_bend(fillet, thickness), 1.0) / max(fillet.area_ratio, 1e-6)
     error = _THROUGH * relative / fillet.stretch / through**1.75
     if inside and not fillet.concave:
@@ -204,8 +203,7 @@ def _column_length(fillet: FilletInSheet, error: float) -> float:
 
     on a concave fillet, and the second one on a convex fillet (symbols as in `_error_through`).
 
-    The error is relative to the wall.
-    """
+    The error is relative to the wall."""
     change = max(fillet.wall_change, _MIN_WALL_CHANGE)
     relative = np.sqrt(error / (_ALONG_CONVEX * change))
     if fillet.concave:
@@ -222,8 +220,7 @@ def _on_flats(flats: FlatsInSheet, s: np.ndarray, thickness: float, error: float
 
     with the radius rho of the free surface when the sheet touches.
 
-    Lengths s along the sheet, thickness h and the error, relative to the wall, are given.
-    """
+    Lengths s along the sheet, thickness h and the error, relative to the wall, are given."""
     if not len(flats.positions):
         return np.full(len(s), np.inf)
     length = flats.stretches * np.sqrt(flats.free_radii * thickness * flats.area_ratios)

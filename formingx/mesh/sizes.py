@@ -18,8 +18,7 @@ def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
 
     .. math:: n(s) = \int_0^s \frac{ds'}{h(s')}
 
-    The trapezoidal rule is used; lengths s and sizes have shape (n,).
-    """
+    The trapezoidal rule is used; lengths s and sizes have shape (n,)."""
     return np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
 
 

@@ -538,8 +538,7 @@ class Law(NormalLaw):
                   d & d \ge \theta \end{cases}
 
         d: signed distances, positive inside, shape (n,), length. F times the penalty k is the normal traction. Without
-        separation F is max(d + theta, 0), and d + theta at `bonded` points, which may be negative (tension).
-        """
+        separation F is max(d + theta, 0), and d + theta at `bonded` points, which may be negative (tension)."""
         F, slope = np.empty(len(d)), np.empty(len(d))
         _C.ramp(len(d), self.theta, self.adhesive, d, None if bonded is False else bonded, F, slope)
         return F, slope
@@ -549,8 +548,7 @@ class Law(NormalLaw):
 
         .. math:: d = \begin{cases} N/k & N > k \theta \\ 2 \sqrt{N \theta / k} - \theta & \text{else} \end{cases}
 
-        For a contact that does not separate, d is N/k - theta.
-        """
+        For a contact that does not separate, d is N/k - theta."""
         over = pressure / (self.k * self.theta)
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.adhesive else over - 1)
 
@@ -569,8 +567,7 @@ class Law(NormalLaw):
         .. math:: \int_{-\theta}^{d} N \, ds = \begin{cases} k (d + \theta)^3 / (12 \theta) & |d| < \theta \\
                   k (d^2/2 + \theta^2/6) & d \ge \theta \end{cases}
 
-        x: shape (n, 2), length. It is 0 for open points, and k (d + theta)^2/2 for a contact that does not separate.
-        """
+        x: shape (n, 2), length. It is 0 for open points, and k (d + theta)^2/2 for a contact that does not separate."""
         d, theta = self.distance(x), self.theta
         if self.adhesive:
             return self.k * np.where(self._bonded(old) | (d > -theta), (d + theta) ** 2 / 2, 0.0)
@@ -622,8 +619,7 @@ class Law(NormalLaw):
         .. math:: \frac{N n_r}{r}
 
         N is the normal traction, n_r the radial component of the normal of the tool. The stiffness of the elastic slip
-        is added for a sticking point. radius: deformed, shape (n,), length; infinite in plane strain.
-        """
+        is added for a sticking point. radius: deformed, shape (n,), length; infinite in plane strain."""
         turned = super().hoop_stiffness(x, old, radius)
         if not self.has_friction:
             return turned

@@ -280,8 +280,7 @@ def volume_ratio(F):
 
     .. math:: J = \det F
 
-    Products that vanish for an F with block structure are left out.
-    """
+    Products that vanish for an F with block structure are left out."""
     J = F[2, 2] * (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
     if is_block(F):
         return J
@@ -369,8 +368,7 @@ def _powers_across(F, b, a):
               = a \, (x c)^{(s - 1)/2} \, \frac{\sinh(s y)}{\sinh y}, \quad s = a - 1, \quad y = \tfrac{1}{2} \ln(x/c)
 
     The second form loses no digits where stretches coincide. At b = 0 the terms are exact in value and in first and
-    second derivatives by F. Eigenvalues of A differ by at least 2e-8 of their mean, which avoids 0/0.
-    """
+    second derivatives by F. Eigenvalues of A differ by at least 2e-8 of their mean, which avoids 0/0."""
     F2, c, s = ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]]), F[2, 2] ** 2, a - 1
     A = F2.T * F2
     m, J2 = ufl.tr(A) / 2, ufl.det(F2) ** 2
@@ -392,8 +390,7 @@ def cofactor_change(F, H):
 
     .. math:: (\delta \, \mathrm{cof} F)_{ij} = F_{ac} H_{bd} + H_{ac} F_{bd} - F_{ad} H_{bc} - H_{ad} F_{bc}
 
-    Here (i, a, b) and (j, c, d) are cyclic permutations of (1, 2, 3).
-    """
+    Here (i, a, b) and (j, c, d) are cyclic permutations of (1, 2, 3)."""
     def entry(i, j):
         (a, b), (c, d) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
         return F[a, c] * H[b, d] + H[a, c] * F[b, d] - F[a, d] * H[b, c] - H[a, d] * F[b, c]

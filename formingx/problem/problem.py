@@ -192,8 +192,7 @@ class Problem:
 
         .. math:: \frac{1}{V} \int_V a \cdot b \, dV
 
-        V is the reference volume. Pressures and multipliers do not count.
-        """
+        V is the reference volume. Pressures and multipliers do not count."""
         return self._dot(self._metric * a.array_r[: self.n_owned], b.array_r[: self.n_owned])
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:

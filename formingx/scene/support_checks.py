@@ -63,8 +63,7 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
 
     is singular.
 
-    A body that can move is an InputError.
-    """
+    A body that can move is an InputError."""
     names, modes = zip(*scene.kinematics.rigid_motions().items())
     gram = np.zeros((len(modes), len(modes)))
     size = max(scene.extent)

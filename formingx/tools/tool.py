@@ -27,8 +27,7 @@ class RigidTool(Protocol):
 
         Returns:
             Points, shape (n, components), length. Point numbers of the pieces: lines, shape (m, 2), or in three
-            dimensions triangles, shape (m, 3).
-        """
+            dimensions triangles, shape (m, 3)."""
 
     @property
     def bounds(self) -> np.ndarray:

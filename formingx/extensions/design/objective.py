@@ -86,8 +86,7 @@ class WallObjective:
         volume V. The last residual is left out without a prescribed volume V0.
 
         Residuals have shape (m,) or (m + 1,), derivatives (m, n) or (m + 1, n). A run without derivative raises an
-        InputError.
-        """
+        InputError."""
         jacobian = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
         target = wall.mean() if self.target_wall is None else self.target_wall

@@ -166,8 +166,7 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
 
     `equation` is the constraint of the base run, None for the plane normal to its path. The residual of the base run is
     returned, shape (n,). PerturbedRunFailure: no state is found; Failure: the tangent is singular or the target
-    constant.
-    """
+    constant."""
     problem, newton = curve.problem, curve.newton
     problem.x.array_w[:] = state.x
     if not newton.tangent(problem.x, state.control):

@@ -385,8 +385,7 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
         """Return (cost, guess, fitted coordinates of the constants) after a least-squares fit.
 
         It starts at coordinates (constants,), with at most `evaluations` (None: 100 for each). A stress that is not
-        finite costs infinity.
-        """
+        finite costs infinity."""
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 
         def residual(x):

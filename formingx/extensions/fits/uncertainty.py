@@ -42,8 +42,7 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
     chapter 5). A standard error is nan if there are no more points than constants. It is infinite if doubling the
     constant changes no stress by more than 1e-6 of its divisor.
 
-    The function `stress` maps constants (p,) to stresses (n,); measured stresses and sizes d have shape (n,).
-    """
+    The function `stress` maps constants (p,) to stresses (n,); measured stresses and sizes d have shape (n,)."""
     values = np.array(list(constants.values()), float)
     first = stress(values)
     slopes = np.stack([_slope(stress, first, values, i, sizes) for i in range(len(values))], axis=1)

@@ -44,8 +44,7 @@ def error_of_layers(layers: float, biot: float) -> float:
     diffusivity a.
 
     Biot number Bi: conductance of the face times thickness over conductivity. The error is relative to the span of
-    temperatures.
-    """
+    temperatures."""
     return _ERROR_OF_ONE_LAYER * _biot_factor(biot) * layers ** -_LAYER_ORDER
 
 

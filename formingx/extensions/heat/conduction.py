@@ -135,8 +135,7 @@ class Conduction(HeatVectors):
         M is the capacity matrix, R the rate of heat, Delta the change of the temperatures y.
 
         `state` and `known` (k) are temperature states, see the class. The guess of the change of the body has shape
-        (n,), degrees. Without a solution, ConvergenceError is raised.
-        """
+        (n,), degrees. Without a solution, ConvergenceError is raised."""
         T = state[0]
         responses = [touch.response(excess, k, c) for touch, excess, k in zip(self.tool_contacts, state[1:], known[1:])]
         change = np.where(self._fixed_mask, 0.0, guess)
@@ -165,8 +164,7 @@ class Conduction(HeatVectors):
         matrix of the last `stage` is reused if it had the same c; otherwise it is assembled at the last temperature.
 
         k is a temperature state of heats. The results are the largest absolute change on all ranks and the change of
-        the body, shape (n,), degrees.
-        """
+        the body, shape (n,), degrees."""
         responses = [touch.response(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
         self._factorise(c, responses, afresh=False)
         rhs = known[0].copy()

@@ -208,8 +208,7 @@ class HeatContact:
         excess temperatures w. The vector e_1 is 1 at the node on the face of the tool, else 0.
 
         Excess temperatures and known heats k per contact area have shape (n, m). With `absolute` False, temperatures
-        are differences of two states, and the back has 0.
-        """
+        are differences of two states, and the back has 0."""
         back = self.back if absolute else 0.0
         if not self.conducts:
             return ToolResponse(np.full(len(self.dofs), back), self.conductance, excess, np.zeros(0))

@@ -33,8 +33,7 @@ class MemoryIntegral:
     Tensors at n points are stored as entries 11, 22, 12, 33, shape (4, n). Cbar = J^(-2/3) C.
 
     `spectrum` is a list of (G, tau), stress and time; without a `damping`, h = 1. It is `irreversible` if h of a past
-    state never increases, and `shifted` if the reduced time depends on the temperature.
-    """
+    state never increases, and `shifted` if the reduced time depends on the temperature."""
 
     coefficients = {"past_S": (0.0,) * 4, "past_C": (1.0, 1.0, 0.0, 1.0), "past_D": ((0.0,) * 4,) * 4,
                     "past_T": (0.0,) * 4}
@@ -137,8 +136,7 @@ class MemoryIntegral:
         S is linearised about the state of the last refresh, with the isochoric right Cauchy-Green tensor Cbar_0 and the
         time step dt_0. There T = dS/dt and D = dS/dCbar, and S_0 is S - T dt_0. The present ones are Cbar and Delta t.
 
-        The coefficients (UFL) are "past_S" for S_0, "past_C" for Cbar_0, "past_D" for D and "past_T" for T.
-        """
+        The coefficients (UFL) are "past_S" for S_0, "past_C" for Cbar_0, "past_D" for D and "past_T" for T."""
         S, D, T = (coefficients[name] for name in ("past_S", "past_D", "past_T"))
         change = _change(C, coefficients)
         linear = sum((S[i] + T[i] * time_step) * C[i] for i in range(4))
@@ -152,8 +150,7 @@ class MemoryIntegral:
         Cbar_0 is the isochoric right Cauchy-Green tensor at the last refresh, about which the stress S is linearised.
         There the work is 0.
 
-        The coefficients (UFL) are "past_C" for Cbar_0 and "past_D" for D; C and dC have the entries 11, 22, 12, 33.
-        """
+        The coefficients (UFL) are "past_C" for Cbar_0 and "past_D" for D; C and dC have the entries 11, 22, 12, 33."""
         D, change = coefficients["past_D"], _change(C, coefficients)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
@@ -192,8 +189,7 @@ def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
     are f, f (1 + s) and f s. For s from 2 to 4 all three are reduced gradually to 0, since BDF2 is unstable for long
     steps.
 
-    s is the length of the step over the length of the previous one.
-    """
+    s is the length of the step over the length of the previous one."""
     s = np.minimum(s, 4.0)
     share = np.minimum(1.0, 2 - s / 2) * s
     return share / (1 + s), share, share * s / (1 + s)

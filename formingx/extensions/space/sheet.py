@@ -68,8 +68,7 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     def add_piece(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
         """Append a straight piece, or an arc about `centre`, from the last point to `point`, unless both coincide.
 
-        name: name of the boundary that the piece belongs to.
-        """
+        name: name of the boundary that the piece belongs to."""
         nonlocal last
         if math.dist(last, point) > 1e-12 * (a + b):
             found.append(Edge(last, point, centre, name))

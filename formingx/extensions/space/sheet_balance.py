@@ -19,8 +19,7 @@ class SheetBalance(EnergyBalance):
 
     in a step from a to b, with the positions x relative to the tool. Contacts with friction lose it. Without friction,
     and where the sheet sticks, the penalty stores it ("bonds"). A point whose gap closed in the last step carries no
-    force yet.
-    """
+    force yet."""
 
     def _body_energies(self, a: Any, b: Any) -> dict[str, float]:
         found = super()._body_energies(a, b)

@@ -307,8 +307,7 @@ def relaxed(F: Any) -> Any:
     .. math:: U = \frac{l_1 + l_2}{2} I + \frac{l_1 - l_2}{2}
         \begin{pmatrix} \cos 2a & \sin 2a \\ \sin 2a & -\cos 2a \end{pmatrix}
 
-    The direction matters for materials whose internal variables are tensors. F: upper triangular, third axis normal.
-    """
+    The direction matters for materials whose internal variables are tensors. F: upper triangular, third axis normal."""
     C11, C22, C12 = F[0, 0]**2, F[0, 1]**2 + F[1, 1]**2, F[0, 0] * F[0, 1]
     J = F[0, 0] * F[1, 1]
     squared = ((C11 - C22) / 2) ** 2 + C12**2
@@ -335,8 +334,7 @@ def smaller_stress(stretches: np.ndarray) -> np.ndarray:
     .. math:: \lambda_2^2 - (\lambda_1 \lambda_2)^{-2}
 
     stretches: principal stretches in the surface, the larger first, shape (n, 2). In compression it is negative for
-    other materials, too.
-    """
+    other materials, too."""
     return stretches[:, 1] ** 2 - stretches.prod(axis=1) ** -2
 
 

@@ -24,8 +24,7 @@ def convergence(path: Any, axes: Any = None) -> Any:
 
     It is the measure of convergence of Song 1993, eq. (3.5.1); figures 3.2 and 5.7 there are of this kind:
 
-    .. math::
-        |\Delta x| / |x|
+    .. math:: |\Delta x| / |x|
     """
     axes = axes if axes is not None else new_axes()
     lines = [[i.correction for i in state.history if i.correction > 0] for state in path.states]

@@ -124,8 +124,7 @@ class ColumnConduction:
 
         .. math:: M \Delta = k + c R(y + \Delta)
 
-        `state` (y) and `known` (k) are temperature states; c is in units of time; `guess` is not used.
-        """
+        `state` (y) and `known` (k) are temperature states; c is in units of time; `guess` is not used."""
         T = state[0]
         responses = [touch.response(excess, k, c) for touch, excess, k in zip(self.tool_contacts, state[1:], known[1:])]
         sources = sum(self._absorbed) + self.power
