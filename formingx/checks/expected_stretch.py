@@ -23,7 +23,6 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
 
 def _cap_stretch(target: Any, radius: float) -> float | None:
     r"""Return the pole stretch of a disc of radius a, inflated to a spherical cap of height H that meets a target.
-
     The points of the thin disc move at right angles to the successive caps, so
 
     .. math:: \lambda = 1 + (H / a)^2

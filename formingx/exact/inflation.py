@@ -149,7 +149,6 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
     N_1 and N_2 are the meridional and circumferential tensions per reference length, p the pressure, theta the slope of
     the meridian and lambda_1 its stretch. R and r are the reference and deformed radius. The pole stretch increases in
     steps. The secant method finds the pressure of each step, for which the circumferential stretch is 1 at the rim.
-
     Lengths are in the reference configuration, c10 is a function of R, and both constants are stresses. A search
     without pressure raises an InputError."""
     from scipy.integrate import solve_ivp

@@ -36,7 +36,6 @@ class WorstValue(NamedTuple):
 
 class Admissible:
     r"""Admissibility check of a deformed body: its hoop stretches and in-plane determinants must be positive.
-
     They are evaluated at the quadrature points of the energy, at points of the next degree, and at edge midpoints.
 
     .. math:: \lambda_\theta = 1 + u_r / R, \qquad

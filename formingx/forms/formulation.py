@@ -37,7 +37,6 @@ from .temperature import Temperature
 
 class Formulation(ABC):
     """Fields and variational forms (UFL) of a model declaration (`Scene`), without contact.
-
     Displacements are divided by `length`, pressures by `stress`, and the residual by stress times volume.
 
     Attributes:

@@ -146,7 +146,6 @@ class LoadedBody:
 
     def unit(self, load: Any) -> float:
         r"""Return the unit of a load: its value divided by its dimensionless amplitude.
-
         In the reference configuration, the nodal forces :math:`f_i` of a unit load add up to
 
         .. math:: \sum_i |f_i| = \frac{\mu V}{L}

@@ -23,7 +23,6 @@ _SEARCH_PIECES = 8
 
 class Outline:
     """Boundary of a deformed solid: m edges of all ranks, each a parabola through its ends and its midpoint.
-
     The body lies to the left of each edge.
 
     Args:

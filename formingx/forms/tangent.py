@@ -109,7 +109,6 @@ class ExtendedMatrix:
 
 class Tangent:
     """Derivatives dF/dx and dF/dcontrol of the residual F, with the constraints of supports.
-
     x are the unknowns. `matrix` holds dF/dx, and `by_control` returns dF/dcontrol.
 
     Args:

@@ -12,7 +12,6 @@ from dolfinx import fem
 
 class TemperatureCoefficient:
     r"""Coefficient f(T) at the quadrature points of the energy, for temperatures that may change with time.
-
     The temperature is known at the beginning :math:`t_0` of a step. Within the step the coefficient is extrapolated
     with its logarithmic rate in the previous step:
 

@@ -19,7 +19,6 @@ _FITTED_POINTS = 12
 
 class MovingLeastSquares:
     r"""Interpolating moving least squares between scattered points.
-
     A quadratic polynomial p is fitted around each target point y to the k nearest values :math:`f_i` at :math:`x_i`
     (Lancaster and Salkauskas, Mathematics of Computation 37, 1981):
 
@@ -136,7 +135,6 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
 def fitted_tensors(interpolation: MovingLeastSquares, values: np.ndarray, source_F: np.ndarray,
                    target_F: np.ndarray) -> np.ndarray:
     r"""Interpolate symmetric positive definite tensors C, entries 11, 22, 12, 33, to other points; collective.
-
     The interpolated quantity is the logarithm relative to the current configuration, so stresses stay continuous:
 
     .. math:: \ln(F^{-T} C F^{-1})

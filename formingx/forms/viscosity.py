@@ -13,7 +13,6 @@ from .. import _compat
 
 class Viscosity:
     r"""Nodal forces of a viscous stress on the whole body, eta V dx for a change dx of the unknowns.
-
     The matrix V belongs to a viscosity of 1, and the methods receive the viscosity eta (dimensionless):
 
     .. math:: w^T V \, dx = \frac{1}{V_0} \int dF : \delta F \, dV_0

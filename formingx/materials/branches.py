@@ -31,7 +31,6 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
     Here :math:`l_i` is the principal stretch of the body, w_i the elastic strain and tau the relaxation time of a
     branch. The flow law of the material is f, for example :math:`f_i = e^{2 w_i} - \tfrac{1}{3} \sum_j e^{2 w_j}`.
-
     Branches have relaxation times (branches,), and f maps w to f(w), both (branches, 3). Times and stretches have shape
     (n,); two stretches at one time are a jump, and `between` has a constant rate, "stretch" or "strain". The result has
     shape (n, branches, 3); a ConvergenceError says where the integration stopped."""

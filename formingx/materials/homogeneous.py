@@ -175,7 +175,6 @@ def stability(response: Response, constants: Any, low: float, high: float) -> Ma
     @np.errstate(all="ignore")
     def margins(mode: str, l: np.ndarray) -> np.ndarray:
         """Return the margins of three criteria, positive where they hold, at stretches l of a test, shape (3, n).
-
         The first is 1 where the stress is finite, else not a number. The second is l^2 dP/dl, the third the smaller
         eigenvalue of the Hessian of W in the logarithmic strains. Both are divided by the size of Hessian and stress.
         """

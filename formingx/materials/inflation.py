@@ -37,16 +37,14 @@ class FreeInflation:
 
     def tube(self, hoop: np.ndarray) -> np.ndarray:
         r"""Return the pressure in a long tube with closed ends that is free to extend.
-
         The axial Cauchy stress is half of the hoop stress. This condition gives the axial stretch
         :math:`\lambda_z` at a hoop stretch :math:`\lambda_h`:
 
         .. math:: P_z \lambda_z = \tfrac{1}{2} P_h \lambda_h, \qquad p = \frac{P_h h_0}{R \lambda_h \lambda_z}
 
         P are nominal stresses, h0 is the reference thickness and R the reference radius. For several layers P h0 is a
-        sum over the layers.
-
-        Hoop stretches have shape (n,); pressures beyond the largest stretch of a material are infinite."""
+        sum over the layers. Hoop stretches have shape (n,); pressures beyond the largest stretch of a material are
+        infinite."""
         low, high = np.full_like(hoop, 0.5), hoop + 1.0
         for _ in range(_HALVINGS):
             axial = (low + high) / 2
@@ -58,16 +56,14 @@ class FreeInflation:
 
     def disc(self, stretch: np.ndarray) -> np.ndarray:
         r"""Return the pressure on a disc that is blown to a spherical cap with a uniform equibiaxial stretch l.
-
         Let a be the radius of the opening and s a the height of the cap. With the nominal stress P and the reference
         thickness h0
 
         .. math:: l^2 = 1 + s^2, \qquad p = \frac{4 s \, P h_0 / l}{a (1 + s^2)}
 
         For several layers P h0 is a sum over the layers. The maximum of the pressure is 2 to 3 % below the maximum for
-        a hinged neo-Hookean disc.
-
-        Stretches l have shape (n,), 1 or larger; pressures beyond the largest stretch of a material are infinite."""
+        a hinged neo-Hookean disc. Stretches l have shape (n,), 1 or larger; pressures beyond the largest stretch of a
+        material are infinite."""
         force = self._forces(in_plane_stretches("equibiaxial", stretch))[0]
         found = 4 * np.sqrt(stretch**2 - 1) * force / (self._radius * stretch**3)
         return np.where(np.isfinite(found), found, np.inf)

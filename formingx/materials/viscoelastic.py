@@ -86,16 +86,14 @@ class Viscoelastic(GeneralisedMaxwell):
 
     def _step_start(self, past, Cv, x):
         r"""Return the tensor G, entries (11, 22, 12, 33), and the factor x' of the closed form of a step.
-
         At the end of the step the internal variable is G + x' C, scaled to the determinant 1. C is the isochoric right
         Cauchy-Green tensor there.
 
         .. math:: G = C_{v,n} + \frac{x}{2} C_n, \qquad
                   x' = \frac{x}{2} \left[1 + \frac{x}{3} \mathrm{tr}(C_n C_{v,n}^{-1})\right]
 
-        A step of first order has G = Cv_n and x' = x.
-
-        C_n is `past`, None for a step of first order, Cv_n is `Cv`, and x is the step over the relaxation time."""
+        A step of first order has G = Cv_n and x' = x. C_n is `past`, None for a step of first order, Cv_n is `Cv`, and
+        x is the step over the relaxation time."""
         if past is None:
             return Cv, x
         return plus(Cv, past, x / 2), x / 2 * (1 + x / 3 * inner(past, cofactor(Cv)))
@@ -155,7 +153,6 @@ class TransientNetwork(GeneralisedMaxwell):
         step. The length of the step over the length of the previous one is s; it is 0 if the previous step is unknown.
         The factor s/(1 + s) is multiplied by 2 - s/2 for s from 2 to 4, and is 0 for larger s, because BDF2 would be
         unstable. It is also 0 where the tensor M of the step (`_past_tensor`) would not be positive definite.
-
         `internal` has {name: internal variable at the beginning of the step (UFL, shape () or (4,))}."""
         s, change = time_step * internal["pace"], entries(internal["change"])
         near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow faster make BDF2 unstable
@@ -185,7 +182,6 @@ class TransientNetwork(GeneralisedMaxwell):
 
     def _past_tensor(self, past, A, x):
         r"""Return the tensor M in the potential mu/2 [tr(C M) - 3] of a branch in a step, entries (11, 22, 12, 33).
-
         Here mu is the shear modulus of the branch, and C the isochoric right Cauchy-Green tensor at the end of the
         step. Its value at the beginning is C_n, at the beginning of the previous step C_n-1:
 

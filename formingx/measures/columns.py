@@ -104,7 +104,6 @@ def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[st
 
 def standard(problem: Any, timed: bool = False) -> dict[str, Quantity]:
     r"""Return the output quantities that every run records.
-
     Energies, volumes, areas and forces belong to the whole part, tool and support, also where a half or a quarter is
     modelled (`Scene.symmetry_factor`). In plane strain they are per unit depth. Columns:
 

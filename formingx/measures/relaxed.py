@@ -17,7 +17,6 @@ _ADDED_STRAIN = 1e-6
 
 class PoleStressRatio:
     r"""Ratio of the Mises stress at the pole to its value after complete relaxation at the same deformation.
-
     Both stresses are means over the reference volume of the elements at the axis:
 
     .. math:: \sigma = \sqrt{\tfrac{3}{2}} \, |\mathrm{dev}(P F^T)|, \qquad P = \frac{\partial W}{\partial F}
@@ -85,7 +84,6 @@ class PoleStressRatio:
 
 class ElasticStretches:
     """Largest principal elastic stretch of each relaxing branch, at n points of every cell.
-
     It is 1 for a relaxed branch. The values at quadrature points are projected to a linear function in each cell, by
     least squares. The points have positions in the reference cell, shape (n, 2).
 

@@ -318,9 +318,7 @@ def swept_volume(problem: Any) -> Any:
     .. math:: V = -\int_0^1 \int_{\Gamma} u \cdot a(t u) \, dS \, dt
 
     a(t u) is the area vector of the face at the displacement t u. For an axisymmetric body it is of degree 2 in t, so
-    the two-point Gauss rule in t is exact.
-
-    A scene without a controlled pressure with a face is an InputError."""
+    the two-point Gauss rule in t is exact. A scene without a controlled pressure with a face is an InputError."""
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
     if driven is None or driven.on is None:
         what = "no driven pressure whose face would enclose" if driven is None else f"{driven!r}, which has no face for"

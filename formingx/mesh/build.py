@@ -143,7 +143,6 @@ def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) 
 
 def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]) -> np.ndarray:
     r"""Return the radii at the ends of elements that are small near given radii, shape (along + 1,), length.
-
     With relative sizes s_i at radii R_i, and D the largest distance of a radius from the nearest R_i, the relative size
     is
 

@@ -177,16 +177,14 @@ def _bend(fillet: FilletInSheet, thickness: float) -> float:
 
 def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside: bool) -> float:
     r"""Return the relative error of the wall on a fillet that is due to the number of elements through the sheet.
-
     With the thickness h0, radius r of the fillet, inverse stretch q, n elements and change s of the logarithm of the
     wall over the fillet it is the larger of
 
     .. math:: b_1 \frac{h_0}{q r n^{7/4}}, \quad b_2 s \Bigl(\frac{h_0}{r}\Bigr)^{3/2} \frac{1}{n^2}.
 
     The second error is that of a convex fillet over which the sheet is drawn. A wall thicker than the radius counts as
-    one as thick as the radius: such an edge is reported.
-
-    `through` is n, and `inside` is False for a lip beside a constrained end."""
+    one as thick as the radius: such an edge is reported. `through` is n, and `inside` is False for a lip beside a
+    constrained end."""
     relative = min(_bend(fillet, thickness), 1.0) / max(fillet.area_ratio, 1e-6)
     error = _THROUGH * relative / fillet.stretch / through**1.75
     if inside and not fillet.concave:
@@ -196,14 +194,12 @@ def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside
 
 def _column_length(fillet: FilletInSheet, error: float) -> float:
     r"""Return the length of a column in the reference configuration that has a given error of the wall on a fillet.
-
     A column of the deformed length l has the larger of the errors
 
     .. math:: a_1 \Bigl(\frac{l}{q^{3/2} r}\Bigr)^{7/4}, \quad a_2 s \Bigl(\frac{l}{r}\Bigr)^2
 
-    on a concave fillet, and the second one on a convex fillet (symbols as in `_error_through`).
-
-    The error is relative to the wall."""
+    on a concave fillet, and the second one on a convex fillet (symbols as in `_error_through`). The error is relative
+    to the wall."""
     change = max(fillet.wall_change, _MIN_WALL_CHANGE)
     relative = np.sqrt(error / (_ALONG_CONVEX * change))
     if fillet.concave:
@@ -213,14 +209,12 @@ def _column_length(fillet: FilletInSheet, error: float) -> float:
 
 def _on_flats(flats: FlatsInSheet, s: np.ndarray, thickness: float, error: float) -> np.ndarray:
     r"""Return the largest length of a column at points of a sheet that touch flat faces, shape (n,), length.
-
     A column of the deformed length l, of a wall h, has the error
 
     .. math:: a_3 \Bigl(\frac{l}{\sqrt{\rho h}}\Bigr)^{3/2}
 
-    with the radius rho of the free surface when the sheet touches.
-
-    Lengths s along the sheet, thickness h and the error, relative to the wall, are given."""
+    with the radius rho of the free surface when the sheet touches. Lengths s along the sheet, thickness h and the
+    error, relative to the wall, are given."""
     if not len(flats.positions):
         return np.full(len(s), np.inf)
     length = flats.stretches * np.sqrt(flats.free_radii * thickness * flats.area_ratios)

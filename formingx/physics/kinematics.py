@@ -360,7 +360,6 @@ def _in_plane_determinant(F):
 
 def _powers_across(F, b, a):
     r"""Return the terms that the entries b = (C13, C23) add to tr C^a, to second order.
-
     C is F^T F, A its in-plane part with an eigenvalue x, and c = C33. To second order x becomes x + b^2/(x - c), so the
     terms are
 

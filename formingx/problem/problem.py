@@ -63,7 +63,6 @@ class _Stage(NamedTuple):
 
 class Problem:
     """Discrete problem of a scene: its residual F, and the derivatives of F by the unknowns x and by the control.
-
     `formingx.solve.equations` describes the members that the solver calls.
 
     Args:

@@ -55,15 +55,12 @@ def check_axis(scene: Any, supports: Sequence[Any]) -> None:
 
 def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
     r"""Check that the supports prevent every rigid motion of the body.
-
     Let c_ij be the constrained displacement component of the rigid motion j (`Kinematics.rigid_motions`) at node i of a
     constraint with n nodes. A constrained mean counts as one node. The body is free to move if the matrix
 
     .. math:: G_{jk} = \sum_{\text{constraints}} \frac{1}{n} \sum_{i=1}^{n} c_{ij} c_{ik}
 
-    is singular.
-
-    A body that can move is an InputError."""
+    is singular. A body that can move is an InputError."""
     names, modes = zip(*scene.kinematics.rigid_motions().items())
     gram = np.zeros((len(modes), len(modes)))
     size = max(scene.extent)

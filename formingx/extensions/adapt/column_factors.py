@@ -108,9 +108,8 @@ def _factors_by_stress_error(path: Any, error: float, middles: np.ndarray) -> np
 
     C h^p is the error of the stress sigma in a column of elements of length h. The order is p = 2, and the run gives
     the constant C of each column. s is the length along the sheet. The smallest ratio of h to the present length over
-    the examined states is returned.
-
-    `error` is epsilon; middles of the columns have shape (rows of nodes, n, 2), length."""
+    the examined states is returned. `error` is epsilon; middles of the columns have shape (rows of nodes, n, 2),
+    length."""
     n = middles.shape[1]
     length = np.linalg.norm(np.diff(path.problem.scene.mesh.columns.place(
         path.problem.scene.mesh.columns.ends)[[0, -1]], axis=1), axis=2).mean(0)

@@ -91,7 +91,6 @@ class Confidence:
 
 def confidence(run: Any, measured: Any) -> Confidence:
     r"""Return the uncertainty of design parameters that were fitted to a measured wall.
-
     With the computed walls h and the measured walls w at m points, and the n parameters p, the covariance is
 
     .. math:: C = s^2 (J^T J)^{-1}, \quad J_{ij} = \frac{1}{w_i} \frac{\partial h_i}{\partial p_j}, \quad

@@ -49,7 +49,6 @@ def missed_target(what: str, requested: float | None, found: float) -> str:
 
 class WallObjective:
     """Least-squares objective of a search: a wanted or an even wall thickness, and possibly a prescribed volume.
-
     The residuals are the relative deviations of the wall thickness at the nodes of the bottom face. The reference
     length of a node is its distance from the axis along the middle line of the undeformed body. The wanted thickness is
     a number, a function of the reference length or None for an even wall, and wrong ones are an InputError. Nodes
@@ -83,10 +82,8 @@ class WallObjective:
             r_{m+1} = 100 \sqrt{m} \left(\frac{V}{V_0} - 1\right)
 
         with the thickness h at the m nodes that count, the wanted thickness w (for an even wall the mean of h), and the
-        volume V. The last residual is left out without a prescribed volume V0.
-
-        Residuals have shape (m,) or (m + 1,), derivatives (m, n) or (m + 1, n). A run without derivative raises an
-        InputError."""
+        volume V. The last residual is left out without a prescribed volume V0. Residuals have shape (m,) or (m + 1,),
+        derivatives (m, n) or (m + 1, n). A run without derivative raises an InputError."""
         jacobian = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
         target = wall.mean() if self.target_wall is None else self.target_wall

@@ -101,7 +101,6 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
 
 class Parameters:
     """Parameters of a design as a vector of n numbers.
-
     A parameter that is a number has one entry, a profile has an entry for each knot.
 
     Attributes:

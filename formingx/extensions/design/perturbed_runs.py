@@ -32,7 +32,6 @@ from ...values.tolerances import ROUND_OFF
 @dataclass(frozen=True)
 class PerturbedTolerances:
     """Convergence criterion of a perturbed run.
-
     A run has converged if its Newton correction of (x, control), over the distance of the perturbed state from the base
     state, is at most the tolerance. Without contact the tolerance is `formingx.values.tolerances.ROUND_OFF`, 1e-9.
 
@@ -68,7 +67,6 @@ class _Start(NamedTuple):
 
 class PerturbedRun:
     """Problem and present state of one perturbed run, a copy of the base run with one parameter slightly changed.
-
     Other elements, or another number of items or unknowns than in the base run, are an InputError.
 
     Attributes:
@@ -156,14 +154,12 @@ class PerturbedRun:
 def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun], equation: Any,
            equations: Sequence[Any]) -> np.ndarray:
     r"""Solve for the states of the perturbed runs near a state of the base run; collective.
-
     Modified Newton iterations use the tangent K and the constraint derivatives of the base run:
 
     .. math:: K \, dx + F_\lambda \, d\lambda = -F', \qquad c_x \, dx + c_\lambda \, d\lambda = -c'
 
     with residual F' and constraint c' of the perturbed run, its unknowns x and its control lambda. Subscripts are
     derivatives. The problem of the base run must be in the state, with the history variables of the state before it.
-
     `equation` is the constraint of the base run, None for the plane normal to its path. The residual of the base run is
     returned, shape (n,). PerturbedRunFailure: no state is found; Failure: the tangent is singular or the target
     constant."""

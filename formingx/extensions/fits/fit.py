@@ -383,7 +383,6 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
 
     def refined(guess: Material, start: Any, evaluations: int | None) -> tuple[float, Material, np.ndarray]:
         """Return (cost, guess, fitted coordinates of the constants) after a least-squares fit.
-
         It starts at coordinates (constants,), with at most `evaluations` (None: 100 for each). A stress that is not
         finite costs infinity."""
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T

@@ -79,7 +79,6 @@ def _initial_material(kind: type[GeneralisedMaxwell]) -> GeneralisedMaxwell:
 
 class _TimedData:
     """Measured values of all tests as one vector, and the values of a relaxing material in the same n rows.
-
     Tests whose times are all the same are an InputError.
 
     Attributes:
@@ -128,7 +127,6 @@ class _TimedData:
 
 class ShiftedTests:
     """Values of a relaxing material in tests at several temperatures.
-
     A branch with the relaxation time tau at the reference temperature has the time aT tau in a test with the shift aT.
     The stresses of branches are computed once, over a wide range of times.
 

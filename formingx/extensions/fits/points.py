@@ -13,7 +13,6 @@ from .weights import divisors, in_range, named_weights
 
 class Points:
     """Measured stresses of elastic tests, which state no times, checked, as one vector of m numbers.
-
     A biaxial test has two stresses at each of its points, the other tests have one. Inconsistent tests, no strain, or
     no point within the range are an InputError.
 

@@ -40,9 +40,8 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 
     with the computed stresses P, the measured ones M, their divisors d and the fitted constants c (Seber and Wild 1989,
     chapter 5). A standard error is nan if there are no more points than constants. It is infinite if doubling the
-    constant changes no stress by more than 1e-6 of its divisor.
-
-    The function `stress` maps constants (p,) to stresses (n,); measured stresses and sizes d have shape (n,)."""
+    constant changes no stress by more than 1e-6 of its divisor. The function `stress` maps constants (p,) to stresses
+    (n,); measured stresses and sizes d have shape (n,)."""
     values = np.array(list(constants.values()), float)
     first = stress(values)
     slopes = np.stack([_slope(stress, first, values, i, sizes) for i in range(len(values))], axis=1)

@@ -41,10 +41,8 @@ def error_of_layers(layers: float, biot: float) -> float:
     .. math:: e = 0.14 \, \frac{Bi}{Bi + 2} \, n^{-1.75}
 
     The constants are fitted to computed errors at the time 0.01 h^2/a, with the thickness h of the sheet and its
-    diffusivity a.
-
-    Biot number Bi: conductance of the face times thickness over conductivity. The error is relative to the span of
-    temperatures."""
+    diffusivity a. Biot number Bi: conductance of the face times thickness over conductivity. The error is relative to
+    the span of temperatures."""
     return _ERROR_OF_ONE_LAYER * _biot_factor(biot) * layers ** -_LAYER_ORDER
 
 

@@ -40,7 +40,6 @@ _MAX_ITERATIONS = 20
 
 class Conduction(HeatVectors):
     """Finite element equations M dT/dt = R(T) of heat conduction in a body and in the tools that touch it.
-
     A temperature state is a list. Its first array has the temperatures of the body at the n locally owned nodes. One
     array follows per tool contact, shape (contact nodes, m). It has the excess temperatures of the tool over its back,
     at m nodes along the depth below each contact node, the face first. Entries of M and R of the body are divided by
@@ -132,10 +131,9 @@ class Conduction(HeatVectors):
 
         .. math:: M \Delta = k + c R(y + \Delta)
 
-        M is the capacity matrix, R the rate of heat, Delta the change of the temperatures y.
-
-        `state` and `known` (k) are temperature states, see the class. The guess of the change of the body has shape
-        (n,), degrees. Without a solution, ConvergenceError is raised."""
+        M is the capacity matrix, R the rate of heat, Delta the change of the temperatures y. `state` and `known` (k)
+        are temperature states, see the class. The guess of the change of the body has shape (n,), degrees. Without a
+        solution, ConvergenceError is raised."""
         T = state[0]
         responses = [touch.response(excess, k, c) for touch, excess, k in zip(self.tool_contacts, state[1:], known[1:])]
         change = np.where(self._fixed_mask, 0.0, guess)
@@ -161,10 +159,9 @@ class Conduction(HeatVectors):
         .. math:: (M - c R') \Delta = k
 
         M is the capacity matrix, R' the derivative of the rate of heat, Delta the change of temperature. The factorised
-        matrix of the last `stage` is reused if it had the same c; otherwise it is assembled at the last temperature.
-
-        k is a temperature state of heats. The results are the largest absolute change on all ranks and the change of
-        the body, shape (n,), degrees."""
+        matrix of the last `stage` is reused if it had the same c; otherwise it is assembled at the last temperature. k
+        is a temperature state of heats. The results are the largest absolute change on all ranks and the change of the
+        body, shape (n,), degrees."""
         responses = [touch.response(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
         self._factorise(c, responses, afresh=False)
         rhs = known[0].copy()

@@ -110,7 +110,6 @@ def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 class _Nodes:
     """Nodes of a grid whose elements are cut into layers: the old nodes, and new ones on cut edges and in triangles.
-
     Cuts are {(first, last): positions from 0 to 1} for the node numbers of the ends of an edge.
 
     Attributes:

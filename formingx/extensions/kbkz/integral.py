@@ -30,10 +30,9 @@ class MemoryIntegral:
         I_1 = \bar C : \bar C_k^{-1}, \quad I_2 = \bar C^{-1} : \bar C_k
 
     S is the second Piola-Kirchhoff stress up to a pressure, W_k the weight of past state k, h the damping function.
-    Tensors at n points are stored as entries 11, 22, 12, 33, shape (4, n). Cbar = J^(-2/3) C.
-
-    `spectrum` is a list of (G, tau), stress and time; without a `damping`, h = 1. It is `irreversible` if h of a past
-    state never increases, and `shifted` if the reduced time depends on the temperature."""
+    Tensors at n points are stored as entries 11, 22, 12, 33, shape (4, n). Cbar = J^(-2/3) C. `spectrum` is a list of
+    (G, tau), stress and time; without a `damping`, h = 1. It is `irreversible` if h of a past state never increases,
+    and `shifted` if the reduced time depends on the temperature."""
 
     coefficients = {"past_S": (0.0,) * 4, "past_C": (1.0, 1.0, 0.0, 1.0), "past_D": ((0.0,) * 4,) * 4,
                     "past_T": (0.0,) * 4}
@@ -135,7 +134,6 @@ class MemoryIntegral:
 
         S is linearised about the state of the last refresh, with the isochoric right Cauchy-Green tensor Cbar_0 and the
         time step dt_0. There T = dS/dt and D = dS/dCbar, and S_0 is S - T dt_0. The present ones are Cbar and Delta t.
-
         The coefficients (UFL) are "past_S" for S_0, "past_C" for Cbar_0, "past_D" for D and "past_T" for T."""
         S, D, T = (coefficients[name] for name in ("past_S", "past_D", "past_T"))
         change = _change(C, coefficients)
@@ -148,9 +146,8 @@ class MemoryIntegral:
         .. math:: \tfrac14 \delta \bar C : (D - D^T) : (\bar C - \bar C_0)
 
         Cbar_0 is the isochoric right Cauchy-Green tensor at the last refresh, about which the stress S is linearised.
-        There the work is 0.
-
-        The coefficients (UFL) are "past_C" for Cbar_0 and "past_D" for D; C and dC have the entries 11, 22, 12, 33."""
+        There the work is 0. The coefficients (UFL) are "past_C" for Cbar_0 and "past_D" for D; C and dC have the
+        entries 11, 22, 12, 33."""
         D, change = coefficients["past_D"], _change(C, coefficients)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
@@ -180,16 +177,13 @@ def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
 
 def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
     r"""Return the factors of the three states that fix a parabola in time, shape of s each.
-
     At a fraction t of the step, from 0 to 1, the parabola deviates from its chord by
 
     .. math:: -t (1 - t) \left(f y_1 - f (1 + s) y_0 + f s y_{-1}\right), \qquad f = \frac{s}{1 + s}
 
     with the values y_1 at the end of the step, y_0 at its start and y_-1 at the start of the previous step. The results
     are f, f (1 + s) and f s. For s from 2 to 4 all three are reduced gradually to 0, since BDF2 is unstable for long
-    steps.
-
-    s is the length of the step over the length of the previous one."""
+    steps. s is the length of the step over the length of the previous one."""
     s = np.minimum(s, 4.0)
     share = np.minimum(1.0, 2 - s / 2) * s
     return share / (1 + s), share, share * s / (1 + s)

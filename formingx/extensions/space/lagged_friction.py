@@ -50,7 +50,6 @@ class Distances(NamedTuple):
 
 class LaggedFriction(LaggedStick):
     """Contact law of points that slide on a tool in three dimensions, with lagged friction or without friction.
-
     Friction is lagged: its limit mu N_0 is constant during a step. N_0 is the pressure at the last accepted state,
     extrapolated along the path. The history variables (`ContactHistory`) of the n points at this state are:
 

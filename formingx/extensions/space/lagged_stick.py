@@ -38,7 +38,6 @@ _BISECTIONS = math.ceil(-math.log2(ROUND_OFF))
 
 class LaggedStick(ContactLaw):
     """Contact law of points that stick where they crossed a tool in three dimensions.
-
     The law is lagged: the points in contact are those of the last accepted state, during the whole next step. Signed
     distances are positive inside the tool. The history variables (`ContactHistory`) of a sticking point are its
     sticking position and the distance 0. The history variables of an open point are its position at the last accepted

@@ -41,7 +41,6 @@ _BRIDGED = 0.25            # cosine of the angle between triangle and tool, belo
 
 class PressureOnTools:
     r"""Virtual work that turns the pressure on triangles that slide on tools into the normals of the tools.
-
     The forms contain the normal n of the tool to first order in the displacement u,
 
     .. math:: n(u, c) = n(u_0, c_0) + H (u - u_0 - (c - c_0) \, w)

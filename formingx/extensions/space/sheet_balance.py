@@ -12,7 +12,6 @@ from ...results.evaluate.work import EnergyBalance
 
 class SheetBalance(EnergyBalance):
     r"""Energy balance of the states of one problem of a sheet in three dimensions.
-
     The contact forces t per area A absorb the energy
 
     .. math:: \sum_i \tfrac{1}{2} (A_i^a t_i^a + A_i^b t_i^b) \cdot (x_i^b - x_i^a)

@@ -299,7 +299,6 @@ class _AlwaysAdmissible:
 
 def relaxed(F: Any) -> Any:
     r"""Return the F whose energy is the relaxed energy of tension-field theory (UFL, shape (3, 3)).
-
     Where the membrane is taut, it is F. Where it wrinkles, it is the stretch tensor U of simple tension with the larger
     principal stretch l1 of F, along the same direction; where both stretches are compressive, it is the identity. With
     the angle a of this direction from the first axis and l2 = l1^(-1/2)

@@ -117,7 +117,6 @@ class _ModesOfState(NamedTuple):
 
 class Modes:
     """Modes of the second variation in the states of a problem: their number, and critical points between two states.
-
     A membrane, an elastic support, or a load without a second variation is an InputError.
 
     Attributes:

@@ -54,7 +54,6 @@ class _BodyWithMode(LoadedBody):
 
 class SecondVariation:
     """Second variation of the energy of a solid at the present state of its problem, for one wave number n at a time.
-
     A mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta), p = Q cos(n theta). In plane strain
     k x3 replaces n theta. Its unknowns are U, W, V + m U and Q at the nodes, with m = 1 for n = 1 and 0 else. A mode
     antisymmetric about a symmetry plane is possible if the support has `mirror=True`. A membrane, an elastic support,

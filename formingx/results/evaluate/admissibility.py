@@ -225,16 +225,13 @@ def _allowed_penetration(contact: Any) -> np.ndarray:
 
 def _force_error(contact: Any, state: State, images: int) -> float:
     r"""Return the estimated relative error of the force F on a moving tool due to penetration; collective.
-
     Penetration stores the energy E. It adds about 2 E/F to the travel t of the tool at this force. With the strain
     energy W of the body and c = `AdmissibilityLimits.largest_energy_ratio`, the estimate is
 
     .. math:: \min\left(\frac{2 E}{F^2} \left|\frac{dF}{dt}\right|, \; c \, \frac{E}{W}\right)
 
     E/W is returned if it is below 0.02 %, a tenth of `WARNED_ERROR`, or if F or the change of t is 0. For a fixed tool
-    0 is returned.
-
-    `state` has the column "strain_energy" of the whole part, which is `images` modelled bodies."""
+    0 is returned. `state` has the column "strain_energy" of the whole part, which is `images` modelled bodies."""
     if not contact.contact.driven:
         return 0.0
     energy = resultants.energy(contact, state.x, state.control)

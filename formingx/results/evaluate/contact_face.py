@@ -50,7 +50,6 @@ class ContactTable(ColumnTable):
 
 class ContactFace:
     """Contact pressure, friction and gap of one `FaceContact`, at the contact points of all ranks.
-
     Creating it and all of its methods are collective.
 
     Attributes:

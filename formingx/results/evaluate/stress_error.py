@@ -115,7 +115,6 @@ class StressPeak(NamedTuple):
 
 class Fitted(NamedTuple):
     """Computed and fitted Cauchy stress at the q quadrature points of each of the m cells that this rank owns.
-
     The fit is made to the deformation gradient F and the second Piola-Kirchhoff stress S.
 
     Attributes:

@@ -40,15 +40,12 @@ class Resultant(NamedTuple):
 
 class Tension:
     r"""Computes the principal stress resultants of an incompressible membrane, forces per deformed length.
-
     A layer has the reference thickness h, the meridional stretch l1, the hoop stretch l2, the stretch l3 of its
     thickness, and the energy density W per reference volume. Its resultants N1 and N2 are
 
     .. math:: N_i = h \, l_3 (l_i P_{ii} - l_3 P_{33}), \qquad P = \partial W / \partial F
 
-    The resultants of all layers are added.
-
-    The problem has a scene whose model is a `Membrane`."""
+    The resultants of all layers are added. The problem has a scene whose model is a `Membrane`."""
 
     def __init__(self, problem: Any):
         forms, self._problem = problem.forms, problem

@@ -44,7 +44,6 @@ _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1
 
 class Fields:
     """Computes fields such as displacement and stress, at the nodes of the cells that this rank owns.
-
     Each cell has six nodes of its own: its corners, and the middles of its edges. A membrane in a section has three.
 
     Attributes:

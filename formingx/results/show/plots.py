@@ -21,7 +21,6 @@ def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
 
 def convergence(path: Any, axes: Any = None) -> Any:
     r"""Draw the relative correction of the unknowns x over the number of the Newton iteration, one line for each state.
-
     It is the measure of convergence of Song 1993, eq. (3.5.1); figures 3.2 and 5.7 there are of this kind:
 
     .. math:: |\Delta x| / |x|

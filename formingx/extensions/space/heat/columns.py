@@ -37,7 +37,6 @@ _CONVERGED = 1e-10
 
 class ColumnConduction:
     """Heat conduction in a column at each of the n locally owned nodes of a sheet, and in the tools that touch it.
-
     It has the methods that `formingx.extensions.heat.stepping` and the history of a `Cooling` call on a `Conduction`.
     The first array of a temperature state has the temperatures of the columns, shape (n, m). Entries of M and R are
     divided by `capacity`.
