@@ -45,9 +45,6 @@ class Admissible:
     On the axis the hoop stretch is its limit, :math:`1 + \partial u_r / \partial R`. A membrane has a hoop stretch
     only. The constructor computes all arrays that do not depend on the state.
 
-    Args:
-        forms: a `Formulation`; its field `w` has the displacement that is checked.
-
     Attributes:
         dofs: unknowns of each displacement component in the locally owned cells, list of arrays of shape (cells, n).
     """

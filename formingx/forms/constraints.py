@@ -52,19 +52,13 @@ class Active(NamedTuple):
 
 
 class Constraints:
-    """All constraints that the supports of a model declaration (`Scene`) can impose.
-
-    Args:
-        forms: the `Formulation`.
-        assemble: function that assembles a compiled linear form and returns its locally owned entries.
+    """All constraints that the supports of a scene can impose; a support where the mesh has no node is an InputError.
+    assemble: function that assembles a compiled linear form and returns its locally owned entries.
 
     Attributes:
         entries: list of `Entry`, the constrained unknowns.
         means: constrained mean displacements of boundaries (`ConstrainedMean`), list of (number of the support in
             `Scene.items`, row of the constraint matrix). A row has the locally owned entries, shape (n,).
-
-    Raises:
-        InputError: a support at a position where the mesh has no node.
     """
 
     def __init__(self, forms: Any, assemble: Callable[[Any], np.ndarray]):

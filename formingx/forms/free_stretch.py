@@ -18,11 +18,7 @@ class FreeStretch:
 
     .. math:: F = J_T^{1/3} F_e
 
-    J_T is the volume ratio of the free thermal expansion. The stretch is 1 in layers without expansion.
-
-    Args:
-        forms: the `Formulation`.
-        expansion: {layer: its `Expansion`}.
+    J_T is the volume ratio of free thermal expansion, by {layer: its `Expansion`}. The stretch is 1 in other layers.
 
     Attributes:
         stretch: :math:`J_T^{1/3}` at the current time (UFL scalar).

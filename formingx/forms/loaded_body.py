@@ -108,17 +108,7 @@ class LoadedBody:
         return self._forms.thickness(boundary)
 
     def stored(self, support: Any) -> Any:
-        """Return the stored energy of an elastic support.
-
-        Args:
-            support: the `Support`.
-
-        Returns:
-            Energy (UFL, rank 0, user's units); None if the support stores no energy.
-
-        Raises:
-            InputError: the energy is not a UFL form of rank 0.
-        """
+        """Return the stored energy of an elastic support (UFL, rank 0, user's units), or None; else an InputError."""
         form = support.stored_energy(self)
         if form is not None and (not isinstance(form, ufl.Form) or form.arguments()):
             raise InputError(f"{support!r}: stored_energy must return a UFL form without body.du, such as"
@@ -126,18 +116,8 @@ class LoadedBody:
         return form
 
     def work(self, load: Any, value: Any) -> Any:
-        """Return the virtual work of a load.
-
-        Args:
-            load: the `Load`.
-            value: its value (UFL scalar, user's units).
-
-        Returns:
-            Virtual work (UFL, rank 1, user's units).
-
-        Raises:
-            InputError: the virtual work is not a UFL form linear in `du`.
-        """
+        """Return the virtual work of a load at a value (UFL, rank 1, user's units); if not linear in `du`, an
+        InputError."""
         form = load.virtual_work(self, value)
         if not isinstance(form, ufl.Form) or [v.number() for v in form.arguments()] != [0]:
             raise InputError(f"{load!r}: virtual_work must return a UFL form linear in body.du, such as"
@@ -145,22 +125,13 @@ class LoadedBody:
         return form
 
     def unit(self, load: Any) -> float:
-        r"""Return the unit of a load: its value divided by its dimensionless amplitude.
+        r"""Return the unit of a load, in the user's units: its value divided by its dimensionless amplitude.
         In the reference configuration, the nodal forces :math:`f_i` of a unit load add up to
 
         .. math:: \sum_i |f_i| = \frac{\mu V}{L}
 
-        with the largest shear modulus mu (`stress`), the volume V and the largest extent L (`length`).
-
-        Args:
-            load: the `Load`.
-
-        Returns:
-            The unit, in the user's units.
-
-        Raises:
-            InputError: the nodal forces of a unit load vanish or are not finite.
-        """
+        with the largest shear modulus mu (`stress`), the volume V and the largest extent L (`length`). Forces that
+        vanish or are not finite are an InputError."""
         form = self._forms.compile(self.work(load, self.constant(1.0)))
         index_map = self._forms.space.dofmap.index_map
         forces = _compat.assemble_vector(la.vector(index_map, 1), form)

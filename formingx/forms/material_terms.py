@@ -18,11 +18,6 @@ from .temperature_coefficient import TemperatureCoefficient
 class MaterialTerms:
     """Coefficients, internal variables and energies of one material in the forms of a problem.
 
-    Args:
-        forms: the `Formulation`.
-        material: the `Material`.
-        names: names of the layers.
-
     Attributes:
         forms: the `Formulation`.
         material: the `Material`.

@@ -39,12 +39,10 @@ FIRST_STRETCH = 1e-6
 
 class MidSurface(Formulation):
     """Forms of a scene as a membrane; the only field is the displacement of the mid-surface.
+    A sheet that is no graph over R, or a load or support not on a face or an end, is an InputError.
 
     Attributes:
         thicknesses: {layer: thickness along Z in the reference configuration (`Function`, length)}.
-
-    Raises:
-        InputError: the sheet is not a graph over R, or a load or support is not on a face or an end of the membrane.
     """
 
     singular_unloaded = True

@@ -23,10 +23,7 @@ _SEARCH_PIECES = 8
 
 class Outline:
     """Boundary of a deformed solid: m edges of all ranks, each a parabola through its ends and its midpoint.
-    The body lies to the left of each edge.
-
-    Args:
-        forms: the `Solid`; its `w` is the examined field.
+    The body lies to the left of each edge; the field `w` of the forms is examined.
 
     Attributes:
         reference_edges: start, end and midpoint of each edge in the reference configuration, shape (m, 3, 2), length.

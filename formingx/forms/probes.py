@@ -19,17 +19,11 @@ from ..ranks import gathered
 class Probe:
     """Evaluation of the displacement at fixed reference points, as weighted sums of the unknowns of a problem.
 
-    Args:
-        problem: the `Problem`.
-        points: reference positions (R, Z), in three dimensions (x, y), shape (n, 2), length, the same on all ranks.
-
     Attributes:
-        points: the reference positions, shape (n, 2), length.
+        points: reference positions (R, Z), in three dimensions (x, y), shape (n, 2), length, the same on all ranks. A
+            point outside the mesh is an InputError.
         earlier_displacement: displacement of the points from the first mesh of a run to this one, 0 without remeshing,
             shape (n, components), length.
-
-    Raises:
-        InputError: a point outside the mesh.
     """
 
     def __init__(self, problem: Any, points: Any):

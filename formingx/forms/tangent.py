@@ -16,19 +16,9 @@ from .constraints import Constraints
 
 
 class ExtendedMatrix:
-    """Sparse matrix of a tangent K and m constraint rows C, allocated once and refilled for every tangent.
-
-    Args:
-        form: compiled bilinear form of K.
-        index_map: index map of its space (block size 1).
-        bcs: DirichletBCs of constrained unknowns. Later calls of `constrain` may constrain a subset of them.
-        rows: list of the m rows of C, locally owned entries, shape (n,) each. Later rows must be 0 where these are 0.
-        comm: MPI communicator.
-        symmetric: True if K is symmetric.
-
-    Attributes:
-        mat: the PETSc matrix.
-    """
+    """Sparse matrix `mat` of a tangent K and m constraint rows C, allocated once and refilled for every tangent.
+    form, index_map: compiled bilinear form of K, and that of its space. rows: C, locally owned entries, shape (n,)
+    each; later rows must be 0 where these are 0. bcs: later calls of `constrain` may constrain a subset of them."""
 
     def __init__(self, form: Any, index_map: Any, bcs: list, rows: list[np.ndarray], comm: Any, symmetric: bool):
         self._form, self._index_map, self._comm = form, index_map, comm
@@ -108,17 +98,8 @@ class ExtendedMatrix:
 
 
 class Tangent:
-    """Derivatives dF/dx and dF/dcontrol of the residual F, with the constraints of supports.
-    x are the unknowns. `matrix` holds dF/dx, and `by_control` returns dF/dcontrol.
-
-    Args:
-        forms: the `Formulation`.
-        constraints: the `Constraints` of its scene.
-        symmetric: True if dF/dx is symmetric.
-
-    Attributes:
-        matrix: the `ExtendedMatrix` of dF/dx.
-    """
+    """Derivatives of the residual F by the unknowns and the control, with the constraints of supports.
+    `matrix`, an `ExtendedMatrix`, holds dF/dx, which may be `symmetric`; `by_control` returns dF/dcontrol."""
 
     def __init__(self, forms: Any, constraints: Constraints, symmetric: bool):
         scene = forms.scene

@@ -11,10 +11,8 @@ from ..scene.temperature import GivenTemperature
 class Temperature:
     """Temperature of a problem's body at the last accepted state.
 
-    Args:
-        given: temperature of the scene (`GivenTemperature`).
-
     Attributes:
+        given: temperature of the scene.
         T: DOLFINx `Function` (P2) of the temperature. After a change call `update_temperature` of the `Problem`.
         before: nodal values of T at an earlier time, with ghosts, shape (n,), or None.
         time: process time of `T`.

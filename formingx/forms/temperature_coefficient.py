@@ -17,14 +17,9 @@ class TemperatureCoefficient:
 
     .. math:: f(t) = f_0 \exp(a (t - t_0)), \qquad a = \frac{\ln f_0 - \ln f_{-1}}{t_0 - t_{-1}}
 
-    The error is of second order in the step length, and f keeps its sign.
-
-    Args:
-        forms: the `Formulation`.
-        values: `Function` of a quadrature element, set to f(T).
-        parts: groups of cells with a function f each, list of (local numbers of cells, f).
-        temperatures: for each group the temperatures at the q quadrature points of its cells, shape (1 or 2, cells,
-            q). The first index is the time: the last accepted state, then, if it is known, the state before.
+    The error is of second order in the step length, and f keeps its sign. `values` is set to f(T). parts: groups of
+    cells, (local numbers, f). temperatures: of each group at the last accepted state, and before it if known, shape
+    (1 or 2, cells, q).
     """
 
     def __init__(self, forms: Any, values: fem.Function, parts: Sequence[tuple[Any, Callable]],

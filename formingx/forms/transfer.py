@@ -18,7 +18,7 @@ _FITTED_POINTS = 12
 
 
 class MovingLeastSquares:
-    r"""Interpolating moving least squares between scattered points.
+    r"""Interpolating moving least squares from source points, shape (m, c), to target points, shape (n, c), length.
     A quadratic polynomial p is fitted around each target point y to the k nearest values :math:`f_i` at :math:`x_i`
     (Lancaster and Salkauskas, Mathematics of Computation 37, 1981):
 
@@ -26,12 +26,7 @@ class MovingLeastSquares:
 
     Quadratic functions are reproduced exactly; other functions have an error of third order in the distance of the
     points. A value at a point of both sets is kept. At a discontinuity the fit overshoots by less than a tenth of the
-    jump.
-
-    Args:
-        comm: MPI communicator; the constructor is collective.
-        source: locally owned source points, shape (m, components), length.
-        target: locally owned target points, shape (n, components), length.
+    jump. Points are locally owned, and the constructor is collective.
 
     Attributes:
         nearest: index of the source point nearest to each target point, shape (n,), for values at the source points of

@@ -18,12 +18,7 @@ class Viscosity:
     .. math:: w^T V \, dx = \frac{1}{V_0} \int dF : \delta F \, dV_0
 
     dF and :math:`\delta F` are the deformation gradients of dx and of virtual unknowns w, V_0 is the reference volume.
-    Constrained unknowns neither cause nor receive forces.
-
-    Args:
-        form: compiled bilinear form of V.
-        bcs: DirichletBCs of the constrained unknowns.
-    """
+    Constrained unknowns neither cause nor receive forces."""
 
     def __init__(self, form: Any, bcs: list):
         self._matrix = fem_petsc.create_matrix(form)

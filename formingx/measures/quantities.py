@@ -27,17 +27,9 @@ class Quantity:
         raise NotImplementedError
 
     def equation(self, target: float) -> Any:
-        r"""Return the equation that the quantity equals a target value, as a dimensionless residual c.
-
-        .. math:: c(x, \lambda) = 0
-
-        Args:
-            target: the target value, in the user's units.
-
-        Returns:
-            Function of the unknowns x, the control lambda and a PETSc vector. It returns c and dc/dlambda, both
-            dimensionless, and sets the vector to dc/dx.
-        """
+        r"""Return the equation c(x, lambda) = 0 that the quantity equals a target value, in the user's units.
+        It is a function of the unknowns x, the control lambda and a PETSc vector. It returns c and dc/dlambda, both
+        dimensionless, and sets the vector to dc/dx."""
         raise NotImplementedError
 
 

@@ -38,21 +38,8 @@ _NUMBERINGS = {"corners": [0, 1, 2, 3, 4, 5], "around": [0, 2, 4, 1, 3, 5]}
 
 
 def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> None:
-    """Write a grid in the text format of `formingx.mesh.text`.
-
-    Args:
-        grid: the grid.
-        file: name of the file.
-        numbering: order of the six nodes of an element: "corners" (the corners first) or "around" (corner, middle,
-            corner, ...).
-
-    Raises:
-        InputError: the numbering is unknown, or the triangles have three nodes.
-
-    >>> fx.mesh.write(fx.mesh.disc(radius=50.0, thickness=2.0, elements=(10, 1)), "plate.msh")
-    >>> sorted(fx.mesh.read("plate.msh").boundaries)
-    ['axis', 'bottom', 'rim', 'top']
-    """
+    """Write a grid of six-node triangles (else an InputError) in the text format of `formingx.mesh.text`.
+    numbering: order of the nodes of an element, "corners" first, or "around" (corner, middle, corner, ...)."""
     order = np.argsort(_NUMBERINGS[_checked_numbering(numbering)])
     if any(t.shape[1] != 6 for t in grid.layers.values()):
         raise InputError("mesh.write: the text format holds six-node triangles; this mesh has three-node ones")

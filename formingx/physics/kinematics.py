@@ -314,7 +314,7 @@ def invariants(F):
 
 
 def sum_of_powers(F, alpha):
-    r"""Return the sum of powers of the principal stretches, smooth where in-plane stretches coincide.
+    r"""Return the sum of powers alpha of the principal stretches of F (UFL), smooth where in-plane ones coincide.
 
     .. math:: \lambda_1^\alpha + \lambda_2^\alpha + \lambda_3^\alpha
 
@@ -326,13 +326,6 @@ def sum_of_powers(F, alpha):
     eigenvalue is computed as det C / (m + d), because m - d would lose digits in a thin sheet. At the switch x = 1e-4,
     five terms and round-off both leave second derivatives exact to some 1e-14 of their norm (alpha from -5 to 10). The
     sum includes the entries 13, 23, 31 and 32, which a non-axisymmetric mode adds to F, to second order.
-
-    Args:
-        F: deformation gradient (UFL, shape (3, 3)).
-        alpha: exponent (UFL scalar or number).
-
-    Returns:
-        The sum (UFL scalar).
     """
     F = in_section_order(F)
     C = F.T * F

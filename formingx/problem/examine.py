@@ -20,17 +20,9 @@ _MIN_COLUMNS = 3           # smallest number of columns of elements of a compres
 
 
 class Examination:
-    """Examination of the last good state and of a failed attempt; collective.
-
-    Args:
-        problem: the `Problem`.
-        last: the last good state, or None.
-        attempt: last iterate of the failed Newton iteration, with x, control and the last corrections dx and dcontrol;
-            None if no iteration failed.
-
-    Attributes:
-        facts: {field of a `Diagnosis`: its value}.
-    """
+    """Examination of the last good state, or None, and of a failed attempt; collective.
+    The attempt is the last iterate of the failed Newton iteration (x, control, last corrections dx and dcontrol), or
+    None. facts: {field of a `Diagnosis`: its value}."""
 
     def __init__(self, problem: Any, last: Any, attempt: Any):
         self.facts: dict[str, Any] = {}

@@ -65,9 +65,6 @@ class Problem:
     """Discrete problem of a scene: its residual F, and the derivatives of F by the unknowns x and by the control.
     `formingx.solve.equations` describes the members that the solver calls.
 
-    Args:
-        scene: the `Scene`.
-
     Attributes:
         scene: the `Scene`.
         forms: fields, forms and scales of the scene (a `Formulation`).
@@ -395,9 +392,6 @@ class Problem:
 class Contacts:
     """Contacts of a problem: the active ones, their linearisation, and the limits that they set to a step.
 
-    Args:
-        problem: the `Problem`.
-
     Attributes:
         faces: contacts that are active in the current stage.
         limit: limits to the length of a step (`StepLimit`).
@@ -456,9 +450,6 @@ class Contacts:
 
 class ProblemHistories:
     """History variables and process time of a problem.
-
-    Args:
-        problem: the `Problem`.
 
     Attributes:
         parts: histories on which F depends (`History`): contacts, then materials, then the temperature.
@@ -547,9 +538,6 @@ class UnloadedBody:
 
 class SceneDescription:
     """Names, units and explanations of the numbers of a problem.
-
-    Args:
-        problem: the `Problem`.
 
     Attributes:
         scales: value in the user's units over dimensionless amplitude of each item; at the end 1.0 for process time.

@@ -27,7 +27,7 @@ def arc_length(points: np.ndarray) -> np.ndarray:
 
 
 class SampledCurve:
-    """Curve through points, shape (n, c), each column over its range, in arc length (Akima's interpolation: no oscillation).
+    """Curve through points, shape (n, c), each column over its range: Akima's interpolation, without oscillation.
 
     Attributes:
         evaluate: function that returns the points of the curve at arc lengths.

@@ -59,13 +59,8 @@ class LaggedFriction(LaggedStick):
       distance, below -theta; shape (n,), length.
     * `closure`: positions that store N_0: their depth in the tool is N_0/k, shape (n, 3), length.
 
-    Args:
-        tool: tool with a method `distances` (see `Distances`).
-        mu: coefficient of friction, shape () or (n,), 0 for contact without friction.
-        k: penalty, stress/length.
-        theta: a point is in contact where its signed distance exceeds -theta, length.
-        elastic_slip: elastic slip at which a point begins to slide, length.
-    """
+    The tool has a method `distances`. mu has shape () or (n,), 0 without friction; k is in stress/length. A point is in
+    contact where its signed distance exceeds -theta, and begins to slide at `elastic_slip`, length."""
 
     tool: Any
     mu: Any

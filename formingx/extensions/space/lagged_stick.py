@@ -37,18 +37,11 @@ _BISECTIONS = math.ceil(-math.log2(ROUND_OFF))
 
 
 class LaggedStick(ContactLaw):
-    """Contact law of points that stick where they crossed a tool in three dimensions.
-    The law is lagged: the points in contact are those of the last accepted state, during the whole next step. Signed
-    distances are positive inside the tool. The history variables (`ContactHistory`) of a sticking point are its
-    sticking position and the distance 0. The history variables of an open point are its position at the last accepted
-    state and its signed distance there, below -theta.
-
-    Args:
-        tool: tool with a method `signed_distance`.
-        k: penalty, stress/length.
-        theta: a point sticks where its signed distance exceeds -theta, length.
-        separates: True if points in tension separate at the end of a step.
-    """
+    """Contact law of points that stick where they crossed a tool in three dimensions, with the penalty k,
+    stress/length. The points in contact are lagged: those of the last accepted state during a whole step. A point
+    sticks where its signed distance, positive inside, exceeds -theta, length. `ContactHistory` has the sticking
+    position and the distance 0 of a sticking point, of an open one its position and signed distance at the last
+    accepted state. separates: True if points in tension separate at the end of a step."""
 
     has_history = adhesive = sticks = True
     mu = np.inf

@@ -51,11 +51,8 @@ def sides_of_edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 class PatchSurface:
     """Closed surface of patches, with its nearest points.
-
-    Args:
-        points: vertices, shape (n, 3), length.
-        triangles: vertex numbers, shape (m, 3), counter-clockwise seen from outside.
-        normals: unit normals at the corners of the triangles, shape (m, 3, 3). Normals of a flat triangle are its own.
+    points: shape (n, 3), length; triangles: shape (m, 3), counter-clockwise seen from outside; normals: unit normals at
+    their corners, shape (m, 3, 3), of a flat triangle its own.
 
     Attributes:
         patches: control points of the patches, shape (m, 18, 3), length. The corners are the rows 0, 4 and 8.

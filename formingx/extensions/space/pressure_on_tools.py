@@ -46,11 +46,7 @@ class PressureOnTools:
     .. math:: n(u, c) = n(u_0, c_0) + H (u - u_0 - (c - c_0) \, w)
 
     with the present displacement u_0 and control c_0, the Hessian H of the distance from the tool, and the motion w of
-    the tool by the control. The derivatives of the forms are therefore exact at (u_0, c_0).
-
-    Args:
-        surface: forms of the sheet, a `Surface`.
-    """
+    the tool by the control. The derivatives of the forms are therefore exact at (u_0, c_0)."""
 
     def __init__(self, surface: Any):
         self._surface = surface

@@ -24,15 +24,11 @@ _NEAR = 1e-3               # distance of these points from a triangle, over the 
 
 class SurfaceSides:
     """Side of points of a surface: outside is the side of the face "top" or "outer".
-
-    Args:
-        cells: nodes of the triangles, shape (m, 3), counter-clockwise seen from the face "top" or "outer".
-        X: reference positions of the nodes, shape (n, 3), length.
-        flat: True if the surface is a flat sheet in the plane z = 0.
-        planes: the `MirrorPlane`s of the scene.
-        size: median edge of the triangles, length.
+    cells: shape (m, 3), counter-clockwise from outside; X: reference positions of nodes, shape (n, 3), length; planes:
+    the `MirrorPlane`s of the scene; size: median edge, length.
 
     Attributes:
+        flat: True if the surface is a flat sheet in the plane z = 0.
         axes: rows are two unit vectors normal to the rays, and that of the rays, shape (3, 3).
         edge: nodes at the edge of the surface, without its cuts at planes of symmetry, shape (k,).
         known: False if the sides of the surface are not known: its open edges are not normal to z.

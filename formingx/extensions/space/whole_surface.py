@@ -13,9 +13,6 @@ from ...ranks import gathered
 class WholeSurface:
     """The n nodes and m triangles of a surface, the same on all ranks.
 
-    Args:
-        surface: formulation of the surface.
-
     Attributes:
         triangles: numbers of the nodes of each triangle, shape (m, 3), counter-clockwise seen from "top" or "outer".
         reference: reference positions of the nodes, shape (n, 3), length.

@@ -48,11 +48,7 @@ class Layer:
 
 class ColumnBasis:
     """Basis of the temperatures through the thickness of a sheet, with m points.
-
-    Args:
-        shares: thickness of each layer over the thickness of the sheet, from the bottom up.
-        properties: `ThermalProperties` of each layer.
-        names: names of the layers.
+    shares: thickness of each layer over that of the sheet, from the bottom up; properties, names: of each layer.
 
     Attributes:
         depths: depths of the points, from 0 at the bottom face to 1 at the top face, shape (m,).

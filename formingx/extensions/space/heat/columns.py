@@ -38,15 +38,8 @@ _CONVERGED = 1e-10
 class ColumnConduction:
     """Heat conduction in a column at each of the n locally owned nodes of a sheet, and in the tools that touch it.
     It has the methods that `formingx.extensions.heat.stepping` and the history of a `Cooling` call on a `Conduction`.
-    The first array of a temperature state has the temperatures of the columns, shape (n, m). Entries of M and R are
-    divided by `capacity`.
-
-    Args:
-        nodes: the `SheetNodes`.
-        basis: the `ColumnBasis`.
-        boundaries: checked laws of heat at the faces.
-        start: initial temperature of the nodes, shape (n,).
-        absolute_zero: absolute zero in the unit of temperatures.
+    The first array of a temperature state has the temperatures of the columns, shape (n, m), which begin at `start`,
+    shape (n,). Entries of M and R are divided by `capacity`.
 
     Attributes:
         basis: the `ColumnBasis`.

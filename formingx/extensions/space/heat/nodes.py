@@ -14,9 +14,6 @@ from .... import _compat
 class SheetNodes:
     """The n locally owned nodes of a sheet, with N nodes including ghosts.
 
-    Args:
-        surface: formulation of the sheet.
-
     Attributes:
         comm: MPI communicator.
         points: reference positions of the owned nodes, shape (n, 3), length.

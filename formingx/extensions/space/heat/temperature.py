@@ -17,14 +17,10 @@ from .nodes import SheetNodes
 
 class ColumnTemperature:
     """Temperature of a sheet at the last accepted state; it replaces `formingx.forms.temperature.Temperature`.
-
-    Args:
-        given: temperature of the scene, uniform through the thickness.
-        surface: formulation of the sheet.
-        basis: basis of the columns, with m points.
+    given: temperature of the scene, uniform through the thickness.
 
     Attributes:
-        basis: the `ColumnBasis`.
+        basis: basis of the columns, with m points.
         sheet: the `SheetNodes`, n of them locally owned, N with ghosts.
         first: temperature of the scene at the nodes, shape (N,).
         now: temperatures of the columns, shape (N, m).
