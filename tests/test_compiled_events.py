@@ -110,7 +110,7 @@ def test_the_frame_of_points_is_that_of_array_operations(pulls):
     for kind in (Law, _Arrays):
         law = kind(tool, np.inf, k, 1e-2, 1e-3, shift, pulls)
         points = CondensedPoints([SimpleNamespace(comm=MPI.COMM_SELF, points=x, law=law, scale=scale)], 0, 0, None)
-        points._mine, points._rows = points._located([(0, 0, i) for i in range(n)])
+        points.choose([np.arange(n)])
         frames.append(points.tool_frame(x, force))
     for a, b in zip(*frames, strict=True):
         np.testing.assert_array_equal(a, b)

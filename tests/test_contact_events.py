@@ -13,7 +13,6 @@ from without import run_without
 import formingx as fx
 from formingx.contact.step_limit import TrialStep
 from formingx.extensions.contact_events.event_sequence import ContactEventSequence, PathSegment
-from formingx.extensions.contact_events.prediction import ContactEventPredictor
 from formingx.extensions.contact_events.reduced_contact import BodyResponse, CondensedPoints, ToolFrame
 from formingx.physics.contact_law import ContactStatus
 from formingx.problem.problem import Problem
@@ -68,7 +67,7 @@ def test_a_predicted_step_ends_near_its_state():
         trial = TrialStep(old.x, old.control, old.direction, old.slope, length, limit.predictor.predict(curve, old))
         limit.length(trial)
         dx, dc = limit.prepare(trial)
-        V, steps = response_at(curve, old).to_points([np.array([point])])
+        V, steps = response_at(curve, old).solve(problem.contact.unit_forces([np.array([point])]))
         F = problem.x.duplicate()
         x = problem.x.duplicate()
         h = 1e-6
@@ -202,10 +201,8 @@ def test_a_plug_with_friction_takes_one_gap_closure_a_step():
     scene = fx.Scene(mesh=fx.mesh.disc(radius=40.0, thickness=1.2, elements=(30, 1)),
                      materials=fx.MooneyRivlin(c10=0.35, c01=0.05), supports=[fx.Symmetry("axis"), fx.Clamped("rim")],
                      contacts=[fx.Contact("top", mould, 0.3), fx.Contact("bottom", tool, 0.3, direction=(0, 1))])
-    limit = Problem(scene).contact.limit
-    predictor = ContactEventPredictor(limit)
-    allowed = [predictor.allowed(contact) for contact in limit.active_contacts]
-    assert predictor.active and allowed == [3, 1]
+    predictor = Problem(scene).contact.limit.predictor
+    assert predictor.active and predictor.allowed == [3, 1]
 
 
 @pytest.mark.parametrize("friction", ["none", 0.3])

@@ -177,7 +177,7 @@ def test_the_solver_sees_equations_alone():
 
 @pytest.mark.thorough
 @pytest.mark.parametrize("friction, most", [
-    ("stick", (291, 40, 780)), ("0.3", (293, 40, 768)), ("free", (140, 32, 225))])
+    ("stick", (275, 39, 770)), ("0.3", (277, 39, 768)), ("free", (138, 32, 218))])
 def test_a_step_passes_few_functions_and_files(friction, most):
     """Functions, files and calls from file to file in a median step; these limits only fall."""
     said = subprocess.run([sys.executable, ROOT / "benchmarks" / "follow.py", friction], capture_output=True, text=True,

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import formingx as fx
+from formingx.results.evaluate.admissibility import AdmissibilityCheck
 
 THICKNESS = 1.0
 
@@ -57,12 +58,12 @@ def test_a_stage_ends_without_late_contact():
 
 def test_deep_penetration_is_reported(drawn):
     """A penetration of 0.2 at the last state is a serious finding; one of 5 makes the state inadmissible."""
-    path = drawn
+    path, check = drawn, AdmissibilityCheck(drawn.problem)
     state, found, up = path.last, path.last.x.copy(), np.arange(2, len(path.last.x), 3)
-    assert serious(path) == [] and path.record.judge(state) == ""
+    assert serious(path) == [] and list(check.reasons(state)) == []
     state.x[up] = found[up] + 0.2 / path.problem.forms.length
     (words,) = serious(path)
     assert "point is 0.2 deep in the tool of 'plug' at (x, y, z) = (" in words
     state.x[up] = found[up] + 5.0 / path.problem.forms.length
-    assert "deep in the tool of 'plug'" in path.record.judge(state)
+    assert "deep in the tool of 'plug'" in next(check.reasons(state))
     state.x[up] = found[up]

@@ -25,7 +25,7 @@ class Face:
         law = Law(tools.Tool([(0.0, 0.0), (9.0, 0.0)]), np.full(1, np.inf), np.full(1, K), THETA, 1e-3)
         here = np.array([[4.0, -0.5 * THETA]])
         history = law.start(here - [[slip, 0.0]])
-        self.points, self.scale, self.law = here, np.ones(1), law
+        self.points, self.scale, self.law, self.comm = here, np.ones(1), law, MPI.COMM_SELF
         self.increment = Increment(law, history, here)
         self.increment.tractions(here)
         self.increment.linearise(here)
@@ -46,7 +46,7 @@ def test_a_point_that_is_pulled_along_its_tool_and_hardly_pressed_to_it(inside, 
     contact = SimpleNamespace(faces=[face], unit_forces=lambda chosen: np.eye(2))
     problem = SimpleNamespace(comm=MPI.COMM_SELF, contact=contact)
     solver = SimpleNamespace(solve_all=lambda E: np.linalg.solve(tangent, C @ E))
-    law = face.increment.law_at(np.array([0]))
+    law = face.increment.after
 
     def along(depth):
         """Motion with a depth, in equilibrium along the tool, where forces are linear."""

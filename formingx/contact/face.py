@@ -62,7 +62,7 @@ class Increment:
     * `tractions(x)`, for the residual.
     * `linearise(x)` at the same positions. After it, `tractions(x)` returns the linearised law with its stiffness.
     * If statuses change, the local contact problem (`LocalSolve`) reads `newly_closed` and `last`, predicts tractions
-      by `law_at`, and sets the sense of sliding of the next iteration by `expect`.
+      by `after`, and sets the sense of sliding of the next iteration by `expect`.
 
     Args:
         law: contact law.
@@ -123,31 +123,25 @@ class Increment:
             return np.zeros(len(self._last_x), dtype=bool)
         return self._law.touching(self._last_x, self._history) & ~self._touched
 
-    def law_at(self, points: np.ndarray | slice) -> Callable[[np.ndarray], Tractions]:
-        """Return the law at m points, linearised after a further motion y of them: a function of y, (m, c), length.
-
-        Its `Tractions` have the traction f and stiffness S before the motion; after it the traction is f + S y.
-        """
+    def after(self, motion: np.ndarray) -> Tractions:
+        """Return the law linearised after a further motion y of the points, shape (n, c), length.
+        Its traction f and stiffness S are those before the motion; after it the traction is f + S y."""
         assert self._before is not None
-        history = self._history and ContactHistory(*[part[points] for part in self._history])
-        law, x, before = self._law.part(points), self._last_x[points], self._before.part(points)
-        return lambda motion: law.tractions(x, history, None, before.to(x + motion))
+        return self._law.tractions(self._last_x, self._history, None, self._before.to(self._last_x + motion))
 
-    def in_ramp(self, points: np.ndarray) -> Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Return a function that predicts how deep m points are in the ramp after a motion, shape (m, c), length.
-
-        It returns the depth over the width 2 theta, shape (m,), from 0 to 1, and the normal times 2 theta, shape (m,
-        c), length; 0 for points that slide, adhere or have no friction. Sticking points stop at the edge with it.
-        """
+    def ramp_depth(self, motion: np.ndarray) -> np.ndarray:
+        """Return the depth in the ramp over its width 2 theta, shape (n,), after a motion, shape (n, c), length."""
         assert self._before is not None
-        width, x = 2 * self._law.theta, self._last_x[points]
-        before = self._before.part(points)
-        law = self._law.part(points)
+        return self._before.to(self._last_x + motion).distance / (2 * self._law.theta) + 0.5
+
+    @property
+    def ramp_normal(self) -> np.ndarray:
+        """Normal times the width of the ramp, along which sticking points stop at its edge, shape (n, c), length.
+        It is 0 for points that slide, adhere or have no friction."""
+        assert self._before is not None
+        law = self._law
         sticks = np.reshape(law.has_friction and not law.adhesive and law.sticks, (-1, 1))
-
-        def depth_and_path(motion: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-            return before.to(x + motion).distance / width + 0.5, width * sticks * before.normal
-        return depth_and_path
+        return 2 * law.theta * sticks * self._before.normal
 
     def expect(self, points: np.ndarray, sense: np.ndarray) -> None:
         """Set the sense of sliding, 1, -1 or 0 (sticking), at masked points, shape (n,) both, for `linearise`."""

@@ -136,14 +136,9 @@ class Lobatto(_NodalPoints):
         first = sum(self._comm.allgather(len(self.points))[:self._comm.rank])
         return (np.bincount(edges.ravel(), ratio.ravel(), len(rest)) / count)[first:][:len(self.points)]
 
-    @property
-    def extent(self) -> np.ndarray:
-        """Share of each node in the contact length of the face, on the first mesh of the body, shape (n,), length."""
-        return self._first_lengths
-
     @cached_property
-    def _first_lengths(self) -> np.ndarray:
-        """Tributary length of each node on the first mesh of the body, shape (n,), length.
+    def extent(self) -> np.ndarray:
+        """Share of each node in the contact length of the face, on the first mesh of the body, shape (n,), length.
 
         It is `lengths` times the mean ratio of edge lengths at the node, first mesh over current mesh.
         """

@@ -140,7 +140,7 @@ class Approach:
             self._bonded_from = np.where(False if guessed is None else guessed, arc_lengths / length, 1.0)
         at_end = ends & face.contact.sticks & (arc_lengths >= LIMITS.friction_fraction * length)
         if speeds is not None and at_end.any():
-            tangent = face.law.part(np.flatnonzero(at_end)).nearest(places[at_end]).tangent
+            tangent = face.law.nearest(places).tangent[at_end]
             slip = np.abs(np.einsum("ni,ni->n", speeds[at_end], tangent)) * (length - arc_lengths[at_end])
             at_end[at_end] = slip <= LIMITS.max_slip_ratio * face.rule.lengths[at_end]
         face.set_closures(np.where(at_end[:, None], np.nan, places), guessed)
@@ -158,45 +158,45 @@ class Approach:
         n: number of locally owned unknowns. ends: True to also reject a step after whose gap closure a point slips
         wrongly (`fraction_to_wrong_slip`). The repeated step ends at this gap closure.
         """
-        x, control = new.x[:n], new.control
-        if self.has_too_many_closures(old.x[:n], old.control, x, control):
+        face = self.face
+        a, b = face.positions(old.x[:n], old.control), face.positions(new.x[:n], new.control)
+        if self.has_too_many_closures(a, b):
             return StepRejection("too many points came into contact in one step")
-        if self.passes_through(old.x[:n], old.control, x, control):
+        if self.passes_through(old.x[:n], old.control, new.x[:n], new.control):
             return StepRejection("a tool would pass through the face that it touches")
-        if length > LIMITS.min_mixed_length and self.opens_and_closes(x, control):
+        if length > LIMITS.min_mixed_length and self.opens_and_closes(b):
             return StepRejection("points lift off while others come into contact", 0.5)
         if ends and length > LIMITS.min_length:
-            part = self.fraction_to_lost_bond(x, control)
+            part = self.fraction_to_lost_bond(b)
             if part < 1:
                 return StepRejection("gap closure", min(LIMITS.overshoot * part, 1.0))
-            part = self.fraction_to_wrong_slip(x, control, new.direction[:n], new.slope, length)
+            part = self.fraction_to_wrong_slip(b, face.relative_motion(new.direction[:n], new.slope), length)
             if part < 1:
                 return StepRejection("gap closure", part)
         return None
 
-    def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
-        """Return True if too many points came into contact in a step; old, new: owned unknowns, shape (n,).
+    def has_too_many_closures(self, a: np.ndarray, b: np.ndarray) -> bool:
+        """Return True if too many points came into contact in a step from positions a to b, shape (n, c), length.
 
         The limit is 2 plus twice the larger of `max_closures` and the number predicted; none without history variables.
         """
         face, theta = self.face, self.face.law.theta
         if face.history is None:
             return False
-        a, b = [face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control))]
-        found = int(np.sum((a <= -theta - LIMITS.negligible_gap * face.thickness) & (b > -theta)))
-        return bool(combined(self._comm, found, MPI.SUM) > 2 * max(self.max_closures, self._predicted_closures) + 2)
+        open_before = face.law.distance(a) <= -theta - LIMITS.negligible_gap * face.thickness
+        found = combined(self._comm, int(np.sum(open_before & (face.law.distance(b) > -theta))), MPI.SUM)
+        return bool(found > 2 * max(self.max_closures, self._predicted_closures) + 2)
 
-    def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
+    def opens_and_closes(self, x: np.ndarray) -> bool:
         """Return True if sticking points lifted off and moved along the tool while other gaps closed, on any ranks.
 
         The positions at which gaps close depend on the points that still stick. A long step gets these positions wrong.
-        new: owned unknowns at its end, shape (n,).
+        x: positions at its end, shape (n, c), length.
         """
         face, theta, history = self.face, self.face.law.theta, self.face.history
         if history is None or not face.contact.sticks or face.law.adhesive:
             return False
-        x, area = face.positions(new, control), face.rule.area > 0
-        near = face.law.nearest(x)
+        near, area = face.law.nearest(x), face.rule.area > 0
         distance, back = near.distance, np.abs(np.einsum("ni,ni->n", near.tangent, x - history.position))
         opens = area & (history.distance > -theta) & (distance <= -theta) & (back > 0)      # not on the axis
         closes = area & (history.distance <= -theta - LIMITS.negligible_gap * face.thickness) & (distance > -theta)
@@ -225,31 +225,29 @@ class Approach:
             found = bool(np.any(law.part(far).distance(places).max(0) > (ends + most)[far]))
         return bool(combined(self._comm, found, MPI.LOR))
 
-    def fraction_to_lost_bond(self, new: np.ndarray, control: float) -> float:
+    def fraction_to_lost_bond(self, x: np.ndarray) -> float:
         """Return the fraction of a step to the first gap closure whose point is open again at its end; else 1.
 
         A point that cannot separate is bonded from the first accepted state after its closure on: the step should end
-        there.
+        there. x: positions at its end, shape (n, c), length.
         """
         if not self.face.law.adhesive:
             return 1.0
-        opened = ~self.face.touching(new, control)
+        opened = ~self.face.law.touching(x, self.face.history)
         return float(combined(self._comm, float(self._bonded_from[opened].min(initial=1.0)), MPI.MIN))
 
-    def fraction_to_wrong_slip(self, new: np.ndarray, control: float, direction: np.ndarray, slope: float,
-                               length: float) -> float:
+    def fraction_to_wrong_slip(self, x: np.ndarray, velocity: np.ndarray, length: float) -> float:
         """Return the fraction of a step to the first gap closure whose point then slips wrongly; 1 without such points.
 
         A sticking point slips wrongly if it moves along the tool by more than `StepLimits.max_slip_ratio` without
         friction. A point with Coulomb friction does so if it slides against its slip since the closure. Pressure and
-        slip are assumed to grow linearly from there, with rates along (direction, slope), d/ds of the unknowns, shape
-        (n,), and the control.
+        slip are assumed to grow linearly from there. x, velocity: positions and d/ds at the end of the step, shape (n,
+        c), length.
         """
         face, law, history = self.face, self.face.law, self.face.history
         if history is None or not law.has_friction:
             return 1.0
-        end, velocity = face.positions(new, control), face.relative_motion(direction, slope)
-        near = law.nearest(end)
+        near = law.nearest(x)
         F, grows = law.ramp(near.distance)
         rate = np.maximum(grows * np.einsum("ni,ni->n", near.normal, velocity), 0.0)
         since = np.minimum(np.divide(F, rate, out=np.full(len(F), length), where=rate > 0), length)
@@ -257,7 +255,7 @@ class Approach:
         if face.contact.sticks:
             wrong = np.isnan(history.closure[:, 0]) & (np.abs(slid) > LIMITS.max_slip_ratio * face.rule.lengths)
         else:
-            counted = np.einsum("ni,ni->n", near.tangent, end - history.closure)
+            counted = np.einsum("ni,ni->n", near.tangent, x - history.closure)
             wrong = (slid * counted < 0) & (np.minimum(np.abs(slid), np.abs(counted)) > law.elastic_slip)
         late = (history.distance <= -law.theta) & (F > 0) & wrong
         return float(combined(self._comm, 1 - float(since[late].max(initial=0.0)) / length, MPI.MIN))
@@ -291,11 +289,16 @@ class EventPrediction(Protocol):
 
 
 class EventPredictor(Protocol):
-    """Predictor of the contact events of all contacts of a `StepLimit`."""
+    """Predictor of the contact events of all contacts of a `StepLimit`.
 
-    @property
-    def active(self) -> bool:
-        """True if contact events are predicted for the contacts that are active now."""
+    Attributes:
+        active: True if contact events are predicted for the contacts that are active now.
+    """
+
+    active: bool
+
+    def enter(self, contacts: list[Approach]) -> None:
+        """Set the contacts that are active in the current stage, and `active`."""
 
     def predict(self, curve: Any, state: Any) -> EventPrediction | None:
         """Return the contact events after an accepted state; None if none can be predicted."""
@@ -334,11 +337,10 @@ class StepLimit:
 
     Attributes:
         active_contacts: the `Approach` of each contact that is active in the current stage.
-        several_closures: True if several gaps may close in one step, in the predicted order. False: each step ends at
-            the next gap closure, without prediction of contact events.
         corrections: corrections of a solved step by contacts that open and close points between steps only; None
             without them. The tool names their class (`formingx.extensions.space.lagged_corrections`).
-        predictor: predictor of contact events, or None.
+        predictor: predictor of contact events, with which several gaps may close in one step. None: each step ends at
+            the next gap closure.
     """
 
     def __init__(self, problem: Any):
@@ -347,12 +349,11 @@ class StepLimit:
             face, heat is not None and heat.conducts(face.contact)) for face in problem.contacts]
         self.active_contacts: list[Approach] = []
         self.corrections: Any = None
-        self.several_closures = not problem.scene.one_node_per_step
-        make = type(self).make_predictor
-        self.predictor = make(self) if make else None
+        make = None if problem.scene.one_node_per_step else type(self).make_predictor
+        self.predictor = make() if make else None
 
-    make_predictor: ClassVar[Callable[[StepLimit], EventPredictor] | None] = None
-    """Function that makes the predictor of contact events of a `StepLimit`; an extension sets it. Without it, a step
+    make_predictor: ClassVar[Callable[[], EventPredictor] | None] = None
+    """Function that makes the predictor of contact events; an extension sets it. Without it, a step
     ends where the gap of a sticking point closes."""
 
     def note_active(self) -> None:
@@ -360,6 +361,8 @@ class StepLimit:
         self.active_contacts = [approach for approach in self._all if approach.face.active]
         lagged = [approach for approach in self.active_contacts if hasattr(approach.face.contact.tool, "corrections")]
         self.corrections = lagged[0].face.contact.tool.corrections(lagged, self._n) if lagged else None
+        if self.predictor:
+            self.predictor.enter(self.active_contacts)
 
     @property
     def only_sticks(self) -> bool:

@@ -168,6 +168,7 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Quantity]:
         found["damage_energy"] = _Scalar(problem, forms.damage_energy, lambda v: v * energy)
     if problem.contacts:
         factors = {c: tool_factor(scene, c.contact) for c in problem.contacts}
+        positive = {c: positive_direction(c.contact) for c in problem.contacts}
         sizes = {"contact_length": resultants.length} if scene.kinematics.components == 2 else {
             "contact_area": resultants.area, "reference_contact_area": resultants.length}
         for column, size in sizes.items():
@@ -177,8 +178,8 @@ def standard(problem: Any, timed: bool = False) -> dict[str, Quantity]:
         tools = {name: [c for c, tool in zip(problem.contacts, tooling.names, strict=True) if tool == name]
                  for name in tooling.force_columns}
         for name in sorted(tools, key=lambda tool: tools[tool][0].contact.direction is None):  # moving tools come first
-            force = _Nodal(problem, lambda c, *state: factors[c] * (resultants.force(c, *state)
-                                                                    @ positive_direction(c.contact)), sum, tools[name])
+            force = _Nodal(problem, lambda c, *state: factors[c] * (resultants.force(c, *state) @ positive[c]), sum,
+                           tools[name])
             found[tooling.force_columns[name]] = force
             if tools[name][0].contact.name:
                 found[f"{name}_force"] = force

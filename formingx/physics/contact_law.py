@@ -105,16 +105,11 @@ class Motion(NamedTuple):
     slip: np.ndarray
     along: np.ndarray
 
-    def part(self, points: np.ndarray | slice) -> Motion:
-        """Return the motion of some of the points (indices, shape (m,), or a slice)."""
-        return Motion(self.position[points], self.distance[points], self.normal[points], self.slip[points],
-                      self.along[points])
-
     def to(self, x: np.ndarray) -> Motion:
         """Predict distances and slips to first order at positions x, shape (n, c), length; gradients stay."""
-        distance, slip = (value + np.einsum("ni,ni->n", gradient, x - self.position) for value, gradient in
-                          ((self.distance, self.normal), (self.slip, self.along)))
-        return Motion(x, distance, self.normal, slip, self.along)
+        dx = x - self.position
+        return Motion(x, self.distance + np.einsum("ni,ni->n", self.normal, dx), self.normal,
+                      self.slip + np.einsum("ni,ni->n", self.along, dx), self.along)
 
 
 class ContactLaw:

@@ -88,7 +88,6 @@ class Path:
             self._views = other._views
         self._view(record.segments[-1])                      # compiles the forms before the run
         record.hooks.on_state.append(self._measure)
-        record.judge = lambda state: next(self._view(record.segments[-1]).admissibility.reasons(state), "")
 
     @property
     def states(self) -> list[State]:
@@ -784,9 +783,10 @@ class Path:
                 raise InputError(f"Path: column {name!r} is not known; known: {', '.join(self.columns)}")
 
     def _measure(self, state: State) -> None:
-        """Compute `State.measures` of a newly accepted state; the run calls this function (`RunHooks.on_state`)."""
+        """Compute measures and admissibility of a newly accepted state; the run calls it (`RunHooks.on_state`)."""
         segment = self.record.segments[-1]
         self._fill(segment, self.states if len(segment.states) == 1 else segment.states)
+        state.inadmissible_reason = next(self._view(segment).admissibility.reasons(state), "")
 
     def _fill(self, segment: Segment, states: list[State]) -> None:
         """Compute `State.measures` of the last of successive states of a segment, the dissipated energy included."""

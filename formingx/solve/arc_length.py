@@ -280,8 +280,15 @@ class Curve:
         It lies in the plane normal to the tangent, or where `equation` holds, such as "quantity = target". `earlier`
         bends the guess to a parabola, and `bend` adds (dx, shape (n,); dcontrol). Away from limit points the predictor
         replaces the guess of x."""
-        end = equation or self._plane(old, *self._predicted(old, length))
-        x, control = self._predicted(old, length, earlier, bend)
+        x, control = old.x + length * old.direction, old.control + length * old.slope
+        end = equation or self._plane(old, x, control)
+        if earlier is not None:
+            h = self.distance(earlier, old)
+            share = (length / h) ** 2
+            x = x + share * (earlier.x - old.x + h * old.direction)
+            control += share * (earlier.control - old.control + h * old.slope)
+        if bend is not None:
+            x, control = x + bend[0], control + bend[1]
         if predictor is None or not self._is_away_from_limit_point(old.slope):
             return self.solve(x, control, end, "step", old)
         guess = predictor(control)                          # with chord iterations
@@ -289,24 +296,6 @@ class Curve:
         if self._is_away_from_limit_point((new.control - old.control) / self.distance(old, new)):
             return new
         return self.solve(new.x, new.control, end, "step", old)        # a new dF/dx gives the direction of the path
-
-    def _predicted(self, old: State, length: float, earlier: State | None = None,
-               bend: Bend | None = None) -> tuple[Array, float]:
-        """Return the guess (x, control) of a step of arc length `length` from `old`; x: owned entries, shape (n,).
-
-        It lies on the tangent, or on the parabola through the state `earlier`. `bend` adds (change of x, shape (n,);
-        change of the control).
-        """
-        x, control = old.x + length * old.direction, old.control + length * old.slope
-        if earlier is not None:
-            h = self.distance(earlier, old)
-            share = (length / h) ** 2
-            x += share * (earlier.x - old.x + h * old.direction)
-            control += share * (earlier.control - old.control + h * old.slope)
-        if bend is not None:
-            x += bend[0]
-            control += bend[1]
-        return x, control
 
     def _is_away_from_limit_point(self, slope: float) -> bool:
         """Return True if the control has more than half of the squared arc length; `slope`: dcontrol/ds."""
@@ -367,11 +356,11 @@ class Curve:
 
         Normality refers to the inner product of arc length. x0: locally owned entries, shape (n,).
         """
+        normal, weight = self.plane_normal(old), self.control_weight * old.slope
+
         def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
-            self._a.array_w[:] = old.direction
-            self.problem.metric_times(self._a, gradient)
+            gradient.array_w[:] = normal
             self._b.array_w[:] = x.array_r - x0
-            weight = self.control_weight * old.slope
             return gradient.dot(self._b) + weight * (control - control0), weight
         return c
 

@@ -14,7 +14,8 @@ stiffnesses.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import itertools
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, TypeAlias
 
@@ -22,7 +23,8 @@ import numpy as np
 from mpi4py import MPI
 from petsc4py import PETSc
 
-from ..ranks import combined, gathered, listed
+from ..physics.contact_law import Tractions
+from ..ranks import combined, listed
 from .equations import Array, Equations
 from .linear import CONDENSATION, DirectSolver
 
@@ -253,7 +255,7 @@ class LocalSolve:
         """
         found = False
         for contact, mark, status in zip(self._contacts, self._marked, self._status):
-            law = contact.increment.law_at(slice(None))(contact.relative_motion(dx, step))
+            law = contact.increment.after(contact.relative_motion(dx, step))
             new = (law.status != status) & ~mark
             mark |= new
             found |= bool(new.any())
@@ -279,14 +281,63 @@ def woodbury(problem: Equations, changes: list[Array], solver: DirectSolver) -> 
     if not points:
         return lambda V, step: V
     small = _Points(problem, chosen, solver, lambda V: np.zeros(V.shape[1]))
-    stiffer = [change[i] for change, i in zip(changes, chosen)]
-    return lambda V, step: small.updated(V, step, stiffer)
+    return lambda V, step: small.updated(V, step, changes)
 
 
-class _Points:
+class FacePoints:
+    """Chosen contact points of several faces on all ranks, such as those with a known compliance of the body.
+
+    m is the number of these points. n is the number of all points of the faces that this rank owns, one face after the
+    other.
+
+    Args:
+        faces: the `FaceContact` objects.
+
+    Attributes:
+        ids: (rank, number among the n points of this rank) of each of the m points.
+        starts: number of the first of the n points of each face, and n, shape (faces + 1,).
+    """
+
+    def __init__(self, faces: Sequence[Any]):
+        self._faces, self._comm = faces, faces[0].comm
+        self.starts = [0, *np.cumsum([len(face.points) for face in faces]).tolist()]
+        self.ids: list[tuple[int, int]] = []
+        self._mine: Any = slice(0)                          # which of the m points are owned
+        self._rows = np.zeros(0, dtype=int)                 # their numbers among the n points
+
+    def choose(self, chosen: list[Array]) -> None:
+        """Add chosen owned points of each face, by their local numbers, at the end: by rank, face and point."""
+        new = [(self._comm.rank, first + int(i)) for first, numbers in zip(self.starts, chosen) for i in numbers]
+        self.ids = [*self.ids, *itertools.chain.from_iterable(listed(self._comm, new))]
+        ranks, rows = np.array(self.ids, dtype=int).reshape(-1, 2).T
+        self._mine = slice(None) if self._comm.size == 1 else np.flatnonzero(ranks == self._comm.rank)
+        self._rows = rows[self._mine]
+
+    def of_faces(self, values: Array) -> list[Array]:
+        """Return the parts of values at the n owned points of all faces, shape (n, ...), that belong to each face."""
+        return [values[a:b] for a, b in itertools.pairwise(self.starts)]
+
+    def values_at(self, values: Array) -> Array:
+        """Return the values at the m points, shape (m, ...), from those at the n owned ones, shape (n, ...)."""
+        return self.of_all_ranks(values[self._rows])
+
+    def of_all_ranks(self, own: Array) -> Array:
+        """Return values at the m points of all ranks, shape (m, ...), from those at the owned ones."""
+        if self._comm.size == 1:
+            return own
+        found = np.zeros((len(self.ids), *own.shape[1:]))
+        found[self._mine] = own
+        return np.asarray(combined(self._comm, found, MPI.SUM))
+
+    def spread(self, values: Array, among: Array) -> None:
+        """Write values at the m points, shape (m, ...), into an array of the n owned points, in place."""
+        among[self._rows] = values[self._mine]
+
+
+class _Points(FacePoints):
     """A few contact points of all ranks, with the compliance of the body at these points.
 
-    There are k points with c components on all ranks. An array of the shape (k c,) has the components of the points one
+    There are m points with c components on all ranks. An array of the shape (m c,) has the components of the points one
     after the other, in the order of ranks, faces and points.
 
     Args:
@@ -298,33 +349,25 @@ class _Points:
     """
 
     def __init__(self, problem: Equations, chosen: list[Array], solver: DirectSolver, border: Border):
-        contacts = problem.contact.faces
-        self._comm, self._contacts, self._chosen = problem.comm, contacts, chosen
-        self._c = contacts[0].points.shape[1]               # number of components
-        self._some = [(c, i) for c, i in zip(contacts, chosen) if len(i)]
-        counts = listed(self._comm, self._c * sum(map(len, chosen)))
-        first = sum(counts[: self._comm.rank])
-        self._own = slice(first, first + counts[self._comm.rank])
-        ends = np.cumsum([0, *map(len, chosen)])
-        self._parts = [slice(a, b) for a, b in zip(ends, ends[1:]) if b > a]    # of the owned points of each contact
+        super().__init__(problem.contact.faces)
+        self.choose(chosen)
+        self._c = self._faces[0].points.shape[1]            # number of components
         self._columns = columns(solver, problem.contact.unit_forces(chosen), border)
-        scale = np.concatenate([np.repeat(c.scale[i], self._c) for c, i in zip(contacts, chosen)])
-        self._scale = self._gather(scale)
-        self._C = self._gather(self._columns.motions(self._moved)) * self._scale
+        self._scale = np.repeat(self.values_at(np.concatenate([face.scale for face in self._faces])), self._c)
+        self._C = self._columns.motions(self._moved) * self._scale
 
     def solve(self, dx: PETSc.Vec, step: float) -> tuple[Array, float] | None:
         """Solve for motions of the points that satisfy the contact law and the compliance of the body at them.
 
         Return the change of dx, locally owned entries, shape (n,), and of step; None if no solution was found.
         """
-        y0 = self._gather(self._moved(dx.array_r, step))
-        f0, S0 = self._forces([(c.increment.last.force[i], c.increment.last.stiffness[i]) for c, i in self._some])
-        laws, ramps = [c.increment.law_at(i) for c, i in self._some], list[Any]()
+        y0 = self._moved(dx.array_r, step)
+        f0, S0 = self._tractions([face.increment.last for face in self._faces])
         y, dy, entry_depth = y0, np.zeros_like(y0), np.full(len(y0) // self._c, LOCAL.entry_depth)
         before, halvings = np.inf, 0                        # residual before the correction dy; how often to halve dy
-        accuracy = LOCAL.accuracy * min([c.law.theta for c in self._contacts])
+        accuracy = LOCAL.accuracy * min([face.law.theta for face in self._faces])
         for k in range(LOCAL.max_iterations):
-            f, S = self._forces([(found.force, found.stiffness) for found in self._at_faces(laws, y)])
+            f, S = self._tractions([face.increment.after(m) for face, m in zip(self._faces, self._motions(y))])
             added = f - f0 + np.einsum("nij,nj->ni", S - S0, y.reshape(-1, self._c)).ravel()
             with np.errstate(over="ignore", invalid="ignore"):
                 R = y - y0 + self._C @ added
@@ -342,20 +385,21 @@ class _Points:
                 return None
             new = y - correction
             if k >= LOCAL.full_corrections:
-                ramps = ramps or [c.increment.in_ramp(i) for c, i in self._some]
-                new, keep = self._stop_at_edge(ramps, y, new, entry_depth)
+                new, keep = self._stop_at_edge(y, new, entry_depth)
                 halvings = 0 if keep else LOCAL.max_halvings
             y, dy = new, new - y
         return None
 
-    def _stop_at_edge(self, ramps: list[Any], y: Array, new: Array, entry_depth: Array) -> tuple[Array, bool]:
-        """Shorten a correction of motions y to `new`, shape (k c,), length, at the outer edge of the ramp.
+    def _stop_at_edge(self, y: Array, new: Array, entry_depth: Array) -> tuple[Array, bool]:
+        """Shorten a correction of motions y to `new`, shape (m c,), length, at the outer edge of the ramp.
 
         The stiffness of a sticking point falls to zero there, so full corrections would take a point out and in again.
-        `ramps` give depths and normals; `entry_depth`, shape (k,), grows in place. Also return True if the correction
-        must not be halved: a point was stopped, or all points stick.
+        `entry_depth`, shape (m,), grows in place. Also return True if the correction must not be halved: a point was
+        stopped, or all points stick.
         """
-        (before, _), (depth, path) = (self._gather_pairs(self._at_faces(ramps, z), (), (self._c,)) for z in (y, new))
+        before, depth = [self.values_at(np.concatenate([
+            face.increment.ramp_depth(m) for face, m in zip(self._faces, self._motions(z))])) for z in (y, new)]
+        path = self.values_at(np.concatenate([face.increment.ramp_normal for face in self._faces]))
         leaves, enters = (before > LOCAL.min_depth) & (depth <= 0), (before <= 0) & (depth > 0)
         stopped = np.where(leaves, LOCAL.kept_depth * np.minimum(before, 1.0),
                            np.where(enters, np.minimum(depth, entry_depth), depth))
@@ -364,21 +408,21 @@ class _Points:
         return new + back.ravel(), bool(back.any() or path.any(axis=1).all())
 
     def updated(self, V: Array, step: float, changes: list[Array]) -> Array | None:
-        """Return V, shape (n, m), for other contact stiffnesses than in K, by Woodbury's formula; None if singular.
+        """Return V, shape (n, k), for other contact stiffnesses than in K, by Woodbury's formula; None if singular.
 
         step: change of the control in V. changes: for each face, of its p owned points, shape (p, c, c), stress/length.
         """
-        added = self._gather(np.concatenate(changes))
-        y = self._with_added_stiffness(added, self._gather(self._moved(V, np.full(V.shape[1], step))))
+        added = self.values_at(np.concatenate(changes))
+        y = self._with_added_stiffness(added, self._moved(V, np.full(V.shape[1], step)))
         if y is None:
             return None
         forces = np.einsum("nij,njm->nim", added, y.reshape(len(added), self._c, -1)).reshape(y.shape)
         return V - self._columns.updates(self._scale[:, None] * forces)
 
     def _with_added_stiffness(self, added: Array, y: Array) -> Array | None:
-        """Return (1 + C S)^-1 y, shape (k c,) or (k c, m): motions with added stiffnesses S; None if singular.
+        """Return (1 + C S)^-1 y, shape (m c,) or (m c, k): motions with added stiffnesses S; None if singular.
 
-        C is the compliance of the body at the points, shape (k c, k c). added: S of each point, shape (k, c, c),
+        C is the compliance of the body at the points, shape (m c, m c). added: S of each point, shape (m, c, c),
         stress/length.
         """
         n = len(y)
@@ -390,26 +434,19 @@ class _Points:
         return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: Array, step: Array | float) -> Array:
-        """Return the motions of the p owned points by dx, shape (n,) or (n, m), and step; collective.
-        They are relative to the tools, shape (p c,) or (p c, m), length."""
-        motions = [c.relative_motion(dx, step)[i] for c, i in zip(self._contacts, self._chosen)]
-        return np.concatenate([motion.reshape(-1, *dx.shape[1:]) for motion in motions])
+        """Return the motions of the m points by dx, shape (n,) or (n, k), and step; collective.
+        They are relative to the tools, shape (m c,) or (m c, k), length."""
+        motions = np.concatenate([face.relative_motion(dx, step) for face in self._faces])
+        return self.values_at(motions).reshape(-1, *dx.shape[1:])
 
-    def _forces(self, parts: list[tuple[Array, Array]]) -> tuple[Array, Array]:
-        """Gather the tractions, shape (k c,), and stiffnesses, shape (k, c, c), from each face's (p, c), (p, c, c)."""
-        force, stiffness = self._gather_pairs(parts, (self._c,), (self._c, self._c))
-        return force.ravel(), stiffness
+    def _motions(self, y: Array) -> list[Array]:
+        """Return the motions of the p owned points of each face, shape (p, c), 0 for points that are not chosen.
+        y: motions of the m points, shape (m c,), length."""
+        motions = np.zeros((self.starts[-1], self._c))
+        self.spread(y.reshape(-1, self._c), motions)
+        return self.of_faces(motions)
 
-    def _at_faces(self, functions: list[Any], y: Array) -> list[Any]:
-        """Return the results of a function of each face at the motions of its points; y: shape (k c,), length."""
-        owned = y[self._own].reshape(-1, self._c)
-        return [f(owned[part]) for f, part in zip(functions, self._parts, strict=True)]
-
-    def _gather_pairs(self, parts: list[tuple[Array, Array]], *shapes: tuple[int, ...]) -> list[Array]:
-        """Return two arrays at the k points of all faces and ranks, shape (k, *shape) each; collective."""
-        found = zip(*parts) if parts else ([np.zeros((0, *shape))] for shape in shapes)
-        return [self._gather(np.concatenate(part)) for part in found]
-
-    def _gather(self, values: Array) -> Array:
-        """Return locally owned values of all ranks, concatenated in the order of the ranks."""
-        return values if self._comm.size == 1 else gathered(self._comm, values)
+    def _tractions(self, found: list[Tractions]) -> tuple[Array, Array]:
+        """Return the tractions, shape (m c,), and stiffnesses, shape (m, c, c), from those of each face; collective."""
+        force = self.values_at(np.concatenate([tractions.force for tractions in found]))
+        return force.ravel(), self.values_at(np.concatenate([tractions.stiffness for tractions in found]))

@@ -63,7 +63,7 @@ class RunHooks:
 
     Attributes:
         on_state: functions called with every accepted state, while the problem has its unknowns and history variables.
-            They fill `State.measures`.
+            They fill `State.measures` and `State.inadmissible_reason`.
         on_step: functions called without arguments whenever a step is complete.
         on_end: functions called when the run ends; their arguments are the text of the failure, or "", and the
             findings.
@@ -92,7 +92,6 @@ class Record:
         ended: reason for which the run ended before its targets, as a result and not as an error; "" if it did not.
         hooks: functions that the run calls (`RunHooks`).
         findings: findings of the checks before the run.
-        judge: function that returns the reason for which no body can have a state, or ""; it needs `State.measures`.
         allow_inadmissible: True if the run keeps states that no body can have.
     """
 
@@ -101,7 +100,6 @@ class Record:
         self.counts, self.stage, self.ended = Counts(), "", ""
         self.hooks = RunHooks()
         self.findings: list[Finding] = []
-        self.judge: Callable[[State], str] = lambda state: ""
         self.allow_inadmissible = False
 
     @property
@@ -165,7 +163,6 @@ class Record:
         try:
             for listener in self.hooks.on_state:
                 listener(state)
-            state.inadmissible_reason = self.judge(state)
             if state.inadmissible_reason and not self.allow_inadmissible:
                 raise InadmissibleState(state.inadmissible_reason)
         except BaseException:

@@ -12,6 +12,7 @@ The path is piecewise linear between the events. A point sticks where its gap cl
 
 from __future__ import annotations
 
+import bisect
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -34,24 +35,17 @@ class GapClosure(NamedTuple):
 
     Attributes:
         arc_length: arc length of the event from the accepted state.
-        rank: rank that owns the point.
+        point: rank that owns the point, and its number among the points of all faces there (`FacePoints.ids`).
         face: number of the contact face.
-        point: local number of the point.
         place: position of the point relative to the tool at the event, shape (2,), length.
         tolerance: convergence tolerance of `place`, length.
     """
 
     arc_length: float
-    rank: int
+    point: tuple[int, int]
     face: int
-    point: int
     place: np.ndarray
     tolerance: float
-
-    @property
-    def point_id(self) -> tuple[int, int, int]:
-        """Identifier of the point, (rank, face, point)."""
-        return self.rank, self.face, self.point
 
 
 class PathSegment(NamedTuple):
@@ -207,10 +201,10 @@ class ContactEventSequence:
         arc_lengths, positions = np.full(len(piece.positions), length), piece.after(length).positions.copy()
         speeds, sure = np.zeros_like(positions), np.zeros(len(positions), dtype=bool)
         for closure in self._closures:
-            s, i = closure.arc_length, points.starts[closure.face] + closure.point
-            if s < length and closure.rank == self._comm.rank:
+            s, (rank, i) = closure.arc_length, closure.point
+            if s < length and rank == self._comm.rank:
                 arc_lengths[i], positions[i], speeds[i] = s, closure.place, self._piece(s).speed[i]
-        points.spread(piece.extended(len(points.point_ids)).status != ContactStatus.FREE, sure)
+        points.spread(piece.extended(len(points.ids)).status != ContactStatus.FREE, sure)
         return tuple(map(points.of_faces, (arc_lengths, positions, sure, speeds)))
 
     def positions(self, length: float) -> list[np.ndarray]:
@@ -223,7 +217,7 @@ class ContactEventSequence:
 
         The change of x has the locally owned entries, shape (size,). The result is None if it is 0 or not finite.
         """
-        piece, m = self._piece(length), len(self._points.point_ids)
+        piece, m = self._piece(length), len(self._points.ids)
         if self._end is not None and piece.begins < self._end.begins <= length:
             piece = self._end                               # in equilibrium there
         piece = piece.extended(m).after(length)
@@ -244,7 +238,8 @@ class ContactEventSequence:
         """
         points, near = self._points, self._points.tool_frame(piece.positions, piece.force)
         u = np.zeros(piece.force.shape) if moved is None else points.values_at(moved)
-        targets = points.motion_to_targets(piece.positions, piece.place, near)
+        along = np.einsum("ni,ni->n", near.tangent, piece.place - points.values_at(piece.positions))
+        targets = along[:, None] * near.tangent + near.beyond[:, None] * near.normal
         force, added = points.forces_at_end(u, piece.status, near, piece.force, targets)
         positions = piece.positions - points.motions @ added.ravel()
         return piece._replace(positions=positions if moved is None else positions + moved, force=force,
@@ -313,10 +308,10 @@ class ContactEventSequence:
         or admissible contact statuses were not found.
         """
         last, closure, end = self._pieces[-1], self._closures[-1], self._end
-        if end is None or closure.point_id not in self._points.point_ids and not self._learn(length):
+        if end is None or closure.point not in self._points.ids and not self._learn(length):
             return False
         self._taken += 1
-        end, k = end.extended(len(self._points.point_ids)), self._points.point_ids.index(closure.point_id)
+        end, k = end.extended(len(self._points.ids)), self._points.ids.index(closure.point)
         status, place = end.status.copy(), end.place.copy()
         near = self._points.tool_frame(end.positions, end.force)
         slips = self._points.values_at(last.speed)[k] @ near.tangent[k]
@@ -358,26 +353,28 @@ class ContactEventSequence:
         path, which gives the position of that point at its gap closure. All arc lengths are measured from the accepted
         state.
         """
-        best: tuple[float, int, int, int] = (length, 0, 0, 0)
+        best: tuple[float, tuple[int, int]] = (length, (0, 0))
         if len(arc_lengths):
             k = int(np.argmin(arc_lengths))
-            best = float(arc_lengths[k]), self._comm.rank, *self._points.face_and_point(k)
-        s, rank, f, i = min(listed(self._comm, best))
+            best = float(arc_lengths[k]), (self._comm.rank, k)
+        s, point = min(listed(self._comm, best))
         if not s < length:
             return False
-        self._closures.append(self._closure(rank, f, i, s, segment.after(s).positions))
+        self._closures.append(self._closure(point, s, segment.after(s).positions))
         return True
 
-    def _closure(self, rank: int, f: int, i: int, s: float, positions: np.ndarray) -> GapClosure:
-        """Return the gap closure of point i of face f near the arc length `s`, with `positions` there."""
+    def _closure(self, point: tuple[int, int], s: float, positions: np.ndarray) -> GapClosure:
+        """Return the gap closure of a point (`GapClosure.point`) near the arc length `s`, with `positions` there."""
         closure: Any = None
+        rank, row = point
         if rank == self._comm.rank:
-            face, row = self._faces[f], self._points.starts[f] + i
+            f = bisect.bisect_right(self._points.starts, row) - 1
+            face, i = self._faces[f], row - self._points.starts[f]
             x, w = positions[row], self._pieces[-1].speed[row]
             ds = face.law.gap_closure(i, x, w, self._pieces[-1].begins - s, _SETTINGS.position_tolerance,
                                       _SETTINGS.surface_iterations)
             tolerance = _SETTINGS.position_tolerance * float(face.rule.lengths[i])
-            closure = GapClosure(s + ds, rank, f, i, x + ds * w, tolerance)
+            closure = GapClosure(s + ds, point, f, x + ds * w, tolerance)
         return closure if self._comm.size == 1 else self._comm.bcast(closure, root=rank)
 
     def _equilibrate(self, length: float) -> bool:
@@ -396,13 +393,13 @@ class ContactEventSequence:
             moved = self._iterated(closure.arc_length, end)
             if moved is None:
                 return False
-            found = self._closure(*closure.point_id, closure.arc_length, moved.positions)
+            found = self._closure(closure.point, closure.arc_length, moved.positions)
             tried.append((end, moved.after(found.arc_length)))
             mixed = self._anderson_mixture(tried)
             if mixed is None:
                 return False
             end = mixed
-            found = self._closure(*closure.point_id, end.begins, end.positions)
+            found = self._closure(closure.point, end.begins, end.positions)
             late = abs(found.arc_length - closure.arc_length) >= _SETTINGS.max_arc_length_change * closure.arc_length
             if late or not found.arc_length > last.begins:
                 return False
@@ -424,8 +421,8 @@ class ContactEventSequence:
         start of `end` for points outside, and for the point whose gap closure is `but`.
         """
         arc_lengths, free = np.full(len(self._free), end.begins), self._free.copy()
-        if but and but.rank == self._comm.rank:
-            free[self._points.starts[but.face] + but.point] = False
+        if but and but.point[0] == self._comm.rank:
+            free[but.point[1]] = False
         parts = map(self._points.of_faces, (arc_lengths, end.positions, last.speed, free))
         for face, t, x, w, candidates in zip(self._faces, *parts):
             near = face.law.nearest(x)
@@ -467,7 +464,7 @@ class ContactEventSequence:
         s: arc length at which the iteration takes place and the result begins. piece: segment to be corrected. Its
         positions, contact forces and `correction` are replaced in the result.
         """
-        piece, points = piece.extended(len(self._points.point_ids)).after(s), self._points
+        piece, points = piece.extended(len(self._points.ids)).after(s), self._points
         x, control, direction, slope = self._tangent
         self._work += 1
         forces = np.full(piece.positions.shape, np.nan)
@@ -493,9 +490,9 @@ class ContactEventSequence:
         last, closure, points, chosen = self._pieces[-1], self._closures[-1], self._points, []
         left = length - last.begins
         arc_lengths = self._gap_closures(last, left)
-        points.spread(np.full(len(points.point_ids), left), arc_lengths)
-        if closure.rank == self._comm.rank:
-            arc_lengths[points.starts[closure.face] + closure.point] = -1.0
+        points.spread(np.full(len(points.ids), left), arc_lengths)
+        if closure.point[0] == self._comm.rank:
+            arc_lengths[closure.point[1]] = -1.0
         for of_face in points.of_faces(arc_lengths):
             first = np.argsort(of_face, kind="stable")[: self._batch]
             chosen.append(np.sort(first[of_face[first] < left]))

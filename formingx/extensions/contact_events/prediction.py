@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from mpi4py import MPI
 
-from ...contact.step_limit import LIMITS, Approach, StepLimit
+from ...contact.step_limit import LIMITS, Approach
 from ...ranks import combined
 from .event_sequence import ContactEventSequence
 from .reduced_contact import BodyResponse
@@ -26,34 +26,30 @@ MAX_CLOSURES = 0.05
 class ContactEventPredictor:
     """Predictor of the contact events in a step: gap closure, sliding and opening.
 
-    Args:
-        limit: the `StepLimit` of the problem, which knows the active contacts; it uses this predictor.
+    Attributes:
+        allowed: number of points of each active contact, on all ranks, whose gaps may close in one step.
+        active: True if contact events are predicted: a contact allows several closures, all laws are predictable.
     """
 
-    def __init__(self, limit: StepLimit):
-        self._limit, self._vectors = limit, list[Any]()
+    def __init__(self) -> None:
+        self._contacts, self._vectors = list[Approach](), list[Any]()
+        self.allowed, self.active = list[int](), False
 
-    def allowed(self, approach: Approach) -> int:
-        """Return the number of points of a face, on all ranks, whose gaps may close in one step.
+    def enter(self, contacts: list[Approach]) -> None:
+        """Set the contacts that are active in the current stage.
 
-        It exceeds `Approach.max_closures` only with stick or friction and `nodes_per_step=None`. On a moving tool
-        points must stick, since long steps of a plug with Coulomb friction may pass a snap. So must Gauss points: the
-        nodes cannot follow the slip of all of them.
+        Several gaps of a face may close in one step only with stick or friction and `nodes_per_step=None`. On a moving
+        tool points must stick, since long steps of a plug with Coulomb friction may pass a snap. So must Gauss points:
+        the nodes cannot follow the slip of all of them.
         """
-        face, most = approach.face, approach.max_closures
-        one_by_one = (not self._limit.several_closures or face.contact.nodes_per_step or face.contact.lagged
-                      or face.moves and not any(c.face.contact.sticks for c in self._limit.active_contacts)
-                      or not face.contact.sticks and face.contact.points != "nodes")
-        if one_by_one or not face.law.has_friction:
-            return most
-        return max(most, round(MAX_CLOSURES * approach.points))
-
-    @property
-    def active(self) -> bool:
-        """True if contact events are predicted: a contact allows several closures, all laws are predictable."""
-        contacts = self._limit.active_contacts
-        return any([self.allowed(c) > c.max_closures for c in contacts]) and all(
-            [c.face.law.predictable for c in contacts])
+        sticks, self._contacts, self.allowed = any(c.face.contact.sticks for c in contacts), contacts, []
+        for approach in contacts:
+            face, most = approach.face, approach.max_closures
+            one_by_one = (face.contact.nodes_per_step or face.contact.lagged or face.moves and not sticks
+                          or not face.contact.sticks and face.contact.points != "nodes" or not face.law.has_friction)
+            self.allowed.append(most if one_by_one else max(most, round(MAX_CLOSURES * approach.points)))
+        self.active = any(allowed > c.max_closures for allowed, c in zip(self.allowed, contacts)) and all(
+            c.face.law.predictable for c in contacts)
 
     def predict(self, curve: Any, state: Any) -> ContactEventPrediction | None:
         """Return the contact events after an accepted state.
@@ -61,13 +57,12 @@ class ContactEventPredictor:
         None if the predictor is not `active`, if the tangent is singular, or at the start of a path without a closed
         point.
         """
-        n, contacts = curve.problem.n_owned, self._limit.active_contacts
+        n, contacts = curve.problem.n_owned, self._contacts
         if not self.active or state.kind == "start" and not any(
                 [c.touches(state.x[:n], state.control) for c in contacts]) or not curve.factorise_one_sided(state):
             return None
         self._vectors = self._vectors or [curve.problem.x.duplicate(), curve.problem.x.duplicate()]
-        return ContactEventPrediction(contacts, [self.allowed(c) for c in contacts], n, state,
-                                      BodyResponse(curve, state, *self._vectors))
+        return ContactEventPrediction(contacts, self.allowed, n, state, BodyResponse(curve, state, *self._vectors))
 
 
 class ContactEventPrediction:

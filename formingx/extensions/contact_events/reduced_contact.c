@@ -297,8 +297,8 @@ double change(long m, const double *friction, const double *pulls, const double 
 
 enum {FRICTION, ELASTIC_SLIP, PULLS, SCALE, THETA, SHIFT, PENALTY, PROPERTIES};       /* columns of properties */
 
-/* in `out` for m points the normal (m, 2), the tangent (m, 2) and the curvature (m) of the profile closest to them, and
-   the distance (m) at which the normal part N of their force (m, 2) acts, `Law.depth`, less their distance, which is
+/* in `out` (m, 6) for m points the normal (2), the tangent (2) and the curvature of the profile closest to them, and
+   the distance at which the normal part N of their force (m, 2) acts, `Law.depth`, less their distance, which is
    reduced by `shift`. The points are `rows` (m) of positions (n, 2), of properties (n, 7) and of ranges (n, 3): first
    piece in the table, number of pieces, of lines. scale: N over the normal traction */
 void frame(long m, const double *positions, const long *rows, const double *force, const double *properties,
@@ -307,14 +307,13 @@ void frame(long m, const double *positions, const long *rows, const double *forc
     for (long i = 0; i < m; i++) {
         const double *p = properties + rows[i] * PROPERTIES, *f = force + 2 * i;
         const long *range = ranges + 3 * rows[i];
-        double distance, *n = out + 2 * i, *t = n + 2 * m;
-        nearest(1, positions + 2 * rows[i], range[1], range[2], table + range[0] * COLUMNS, &distance, n,
-                out + 4 * m + i);
+        double distance, *n = out + 6 * i;
+        nearest(1, positions + 2 * rows[i], range[1], range[2], table + range[0] * COLUMNS, &distance, n, n + 4);
         double N = (f[0] * n[0] + f[1] * n[1]) / p[SCALE], theta = p[THETA];
         double over = (p[PULLS] > 0 ? N : fmax(N, 0.0)) / (p[PENALTY] * theta);
         double depth = theta * (p[PULLS] > 0 ? over - 1 : over > 1 ? over : 2 * sqrt(over) - 1);
-        t[0] = -n[1];
-        t[1] = n[0];
-        out[5 * m + i] = depth - (distance - p[SHIFT]);
+        n[2] = -n[1];
+        n[3] = n[0];
+        n[5] = depth - (distance - p[SHIFT]);
     }
 }

@@ -16,23 +16,21 @@ with the normal n into the tool and its tangent t: the geometric stiffness of co
 
 from __future__ import annotations
 
-import bisect
-import itertools
 from collections.abc import Sequence
 from dataclasses import astuple, dataclass
 from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
-from mpi4py import MPI
 from petsc4py import PETSc
 
 from ..._jit import CFunctions
 from ...contact.step_limit import LIMITS
 from ...physics.contact_law import ContactStatus
-from ...ranks import combined, listed
+from ...ranks import combined
 from ...solve.arc_length import Curve
 from ...solve.equations import Array
+from ...solve.local_contact import FacePoints
 from ...solve.state import State
 from ...values.tolerances import FAR
 
@@ -54,17 +52,16 @@ class BodyResponse:
         state: the accepted state.
         x: work vector for the unknowns.
         F: work vector for the residual.
+
+    Attributes:
+        problem: the problem, with all members of its class.
     """
 
     def __init__(self, curve: Curve, state: State, x: PETSc.Vec, F: PETSc.Vec):
         self._newton, self._state, self._made = curve.newton, state, curve.newton.solver.count
-        self._problem: Any = curve.problem                  # it knows its constrained unknowns, too
+        self.problem: Any = curve.problem                   # it knows its constrained unknowns, too
         self._normal = curve.plane_normal(state)
         self._x, self._F = x, F
-
-    def to_points(self, chosen: list[Array]) -> tuple[Array, Array] | None:
-        """Return dx, shape (n, m), dcontrol, (m,), by forces -1 at chosen owned points; None if K changed."""
-        return self._solve(self._problem.contact.unit_forces(chosen))
 
     def to_equilibrium(self, x: Array, control: float, forces: list[Array]) -> tuple[Array, float] | None:
         """Return one modified Newton correction of (x, control), x of shape (n,), with given contact forces.
@@ -74,18 +71,18 @@ class BodyResponse:
         """
         self._x.array_w[:] = x
         try:
-            for face, given in zip(self._problem.contact.faces, forces, strict=True):
+            for face, given in zip(self.problem.contact.faces, forces, strict=True):
                 face.applied = given
-            self._problem.residual(self._x, control, self._F)
+            self.problem.residual(self._x, control, self._F)
         finally:
-            for face in self._problem.contact.faces:
+            for face in self.problem.contact.faces:
                 face.applied = None
         left = self._F.array_r.copy()
-        left[self._problem.constrained] = 0.0
-        found = self._solve(left[:, None])
+        left[self.problem.constrained] = 0.0
+        found = self.solve(left[:, None])
         return None if found is None or not np.isfinite(found[0]).all() else (found[0][:, 0] * -1, -float(found[1][0]))
 
-    def _solve(self, E: Array) -> tuple[Array, Array] | None:
+    def solve(self, E: Array) -> tuple[Array, Array] | None:
         """Return dx, shape (n, m), and dcontrol, shape (m,), by changes E of the residual, owned rows, shape (n, m).
 
         None if K with the changed stiffness of a few points is singular, or if the factors belong to another tangent.
@@ -93,7 +90,7 @@ class BodyResponse:
         V = self._newton.solve_one_sided(E) if self._made == self._newton.solver.count else None
         if V is None:
             return None
-        along = combined(self._problem.comm, self._normal @ V)
+        along = combined(self.problem.comm, self._normal @ V)
         return V - np.outer(self._state.direction, along), -self._state.slope * along
 
 
@@ -138,7 +135,7 @@ class ToolFrame(NamedTuple):
     beyond: np.ndarray
 
 
-class CondensedPoints:
+class CondensedPoints(FacePoints):
     """Contact points of all ranks whose compliance is known: the motion of the body under unit forces at these points.
 
     Each unit force contributes -1 to one component (r or z) of the residual F at one point. m is the number of these
@@ -151,26 +148,22 @@ class CondensedPoints:
         response: `BodyResponse`, which solves for the motion of the body under forces by the stored LU factors.
 
     Attributes:
-        point_ids: (rank, face, point) of each of the m points.
         columns: changes of x under these unit forces, locally owned rows, shape (size, 2 m).
         steps: changes of the control under these forces, shape (2 m,).
         motions: motions of the n owned points of all faces under these forces, shape (n, 2, 2 m), length.
-        starts: number of the first of these n points of each face, and n, shape (faces + 1,).
         friction: coefficient of friction, infinite for stick, shape (m,).
         elastic_slip: elastic slip at which a point begins to slide, shape (m,), length.
     """
 
     def __init__(self, faces: Sequence[Any], n: int, size: int, response: BodyResponse):
-        self._faces, self._n, self._response, self._comm = faces, n, response, faces[0].comm
+        super().__init__(faces)
+        self._n, self._response = n, response
         empty: Any = np.zeros(0)
-        self.point_ids: list[tuple[int, int, int]] = []
         self.columns, self.steps = np.zeros((size, 0)), empty
         c = faces[0].points.shape[1]
-        self.starts = [0, *np.cumsum([len(face.points) for face in faces]).tolist()]
         self.motions = np.zeros((self.starts[-1], c, 0))
         self.friction, self.elastic_slip, self._pulls = empty, empty, empty.astype(bool)
         self._S, self._C = np.zeros((0, c, c)), np.zeros((0, 0))
-        self._mine, self._rows = self._located([])
 
     def learn(self, chosen: list[np.ndarray], touched: bool = False) -> bool:
         """Add chosen owned points of each face, and solve for their compliance with the stored LU factors.
@@ -178,20 +171,18 @@ class CondensedPoints:
         touched: True if the factorised tangent contains their stiffness. Return False if the factors no longer belong
         to the state; no point is then added.
         """
-        found = self._response.to_points(chosen)
+        found = self._response.solve(self._response.problem.contact.unit_forces(chosen))
         if found is None:
             return False
-        new = [point for rank in listed(self._comm, [(self._comm.rank, f, int(i)) for f, numbers in enumerate(chosen)
-                                                     for i in numbers]) for point in rank]
-        old, self.point_ids = len(self.point_ids), self.point_ids + new
-        self._mine, self._rows = self._located(self.point_ids)
+        old = len(self.ids)
+        self.choose(chosen)
         self.columns, self.steps = np.column_stack([self.columns, found[0]]), np.append(self.steps, found[1])
         motions = [face.relative_motion(found[0][: self._n], found[1]) for face in self._faces]
         self.motions = np.concatenate([self.motions, np.concatenate(motions)], axis=-1)
         self._C = self.values_at(self.motions).reshape(len(self.steps), -1)
         friction, self.elastic_slip, pulls = self.values_at(self._properties)[:, :3].T
         self.friction, self._pulls = np.where(friction < FAR, friction, np.inf), pulls > 0
-        S = np.zeros((len(self.point_ids), *self._S.shape[1:]))
+        S = np.zeros((len(self.ids), *self._S.shape[1:]))
         S[:old] = self._S
         if touched:
             S[old:] = self.values_at(np.concatenate([face.stiffness_in_tangent for face in self._faces]))[old:]
@@ -218,60 +209,20 @@ class CondensedPoints:
         """Mask of the points that never slide, shape (n,) for the n owned points of all faces."""
         return self._properties[:, 0] >= FAR
 
-    def of_faces(self, values: np.ndarray) -> list[np.ndarray]:
-        """Return the parts of values at the n owned points of all faces, shape (n, ...), that belong to each face."""
-        return [values[a:b] for a, b in itertools.pairwise(self.starts)]
-
-    def face_and_point(self, row: int) -> tuple[int, int]:
-        """Return the number of the face, and on it the local number, of an owned point of all faces."""
-        f = bisect.bisect_right(self.starts, row) - 1
-        return f, row - self.starts[f]
-
-    def values_at(self, values: np.ndarray) -> np.ndarray:
-        """Return the values at the m points, shape (m, ...), from those at the n owned ones, shape (n, ...)."""
-        return self._of_all_ranks(values[self._rows])
-
-    def _of_all_ranks(self, own: np.ndarray) -> np.ndarray:
-        """Return values at the m points of all ranks, shape (m, ...), from those at the owned ones."""
-        if self._comm.size == 1:
-            return own
-        found = np.zeros((len(self.point_ids), *own.shape[1:]))
-        found[self._mine] = own
-        return np.asarray(combined(self._comm, found, MPI.SUM))
-
-    def spread(self, values: np.ndarray, among: np.ndarray) -> None:
-        """Write values at the m points, shape (m, ...), into an array of the n owned points, in place."""
-        among[self._rows] = values[self._mine]
-
-    def _located(self, point_ids: Sequence[tuple[int, int, int]]) -> tuple[Any, np.ndarray]:
-        """Return the indices of the k owned points in `point_ids`, (rank, face, point) each, and their numbers.
-
-        Indices: a slice or shape (k,). Numbers among owned points: shape (k,).
-        """
-        ids = np.array(point_ids, dtype=int).reshape(-1, 3)
-        mine = slice(None) if self._comm.size == 1 else np.flatnonzero(ids[:, 0] == self._comm.rank)
-        return mine, np.array(self.starts)[ids[mine, 1]] + ids[mine, 2]
-
-    def motion_to_targets(self, positions: np.ndarray, place: np.ndarray, near: ToolFrame) -> np.ndarray:
-        """Return the motion of the m points to `place` along, and to the depth of their force normal to, the tools.
-        positions: of the n points. place and result: shape (m, 2), length."""
-        along = np.einsum("ni,ni->n", near.tangent, place - self.values_at(positions))
-        return along[:, None] * near.tangent + near.beyond[:, None] * near.normal
-
     def tool_frame(self, positions: np.ndarray, force: np.ndarray) -> ToolFrame:
-        """Return normals, tangents, curvatures and `beyond` of the tools at the m points (`point_ids`).
+        """Return normals, tangents, curvatures and `beyond` of the tools at the m points (`ids`).
 
         positions: of the n owned points relative to their tools, shape (n, 2), length. force: contact forces, shape (m,
         2). `beyond` is the depth that gives the force of a point, minus its depth.
         """
-        k, own = len(self._rows), force[self._mine]
+        own = force[self._mine]
         if self._profiles is None:
             found = self._frame_by_arrays(positions, own)
         else:
-            found, (table, ranges) = np.empty(6 * k), self._profiles
-            _C.frame(k, positions, self._rows, own, self._properties, ranges, table, found)
-        normal, tangent = found[: 2 * k].reshape(k, 2), found[2 * k: 4 * k].reshape(k, 2)
-        return ToolFrame(*map(self._of_all_ranks, (normal, tangent, found[4 * k: 5 * k], found[5 * k:])))
+            found, (table, ranges) = np.empty((len(self._rows), 6)), self._profiles
+            _C.frame(len(self._rows), positions, self._rows, own, self._properties, ranges, table, found)
+        found = self.of_all_ranks(found)
+        return ToolFrame(found[:, :2], found[:, 2:4], found[:, 4], found[:, 5])
 
     @cached_property
     def _profiles(self) -> tuple[np.ndarray, np.ndarray] | None:
@@ -290,10 +241,10 @@ class CondensedPoints:
     def _frame_by_arrays(self, positions: np.ndarray, force: np.ndarray) -> np.ndarray:
         """Return the tool geometry at the k owned ones of the m points as the C function `frame` does, for any tools.
 
-        positions: shape (n, 2), length. force: shape (k, 2). The result, shape (6 k,), has normals (k, 2), tangents (k,
-        2), curvatures (k,) and `ToolFrame.beyond` (k,), flat.
+        positions: shape (n, 2), length. force: shape (k, 2). The columns of the result, shape (k, 6), are those of
+        `ToolFrame`.
         """
-        found = np.zeros((6, len(self._rows)))
+        found = np.zeros((len(self._rows), 6))
         for face, first, end in zip(self._faces, self.starts, self.starts[1:]):
             k = np.flatnonzero((first <= self._rows) & (self._rows < end))
             i = self._rows[k]
@@ -301,8 +252,8 @@ class CondensedPoints:
             near = law.nearest(x)
             N = np.einsum("ni,ni->n", force[k], near.normal) / face.scale[i - first]
             beyond = law.depth(N if law.adhesive else np.maximum(N, 0.0)) - near.distance
-            found[:, k] = *near.normal.T, *near.tangent.T, near.curvature, beyond
-        return np.concatenate([found[:2].T.ravel(), found[2:4].T.ravel(), *found[4:]])
+            found[k] = np.column_stack([near.normal, near.tangent, near.curvature, beyond])
+        return found
 
     def forces_at_end(self, u: np.ndarray, status: np.ndarray, near: ToolFrame, force: np.ndarray,
                       to: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -393,6 +393,5 @@ def _path_of(state: Any, record: Record) -> Path:
     """Return a path with a copy of one state, with its own measures, in an empty record of a run."""
     path, state = Path(record), replace(state)
     record.segments[-1].states.append(state)
-    for listener in record.hooks.on_state:
-        listener(state)
+    path._fill(record.segments[-1], [state])
     return path

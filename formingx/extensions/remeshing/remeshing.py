@@ -161,7 +161,7 @@ def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part:
     poor = bool(record.states) and _needs_remeshing(record, record.last, remesh)
     failed: list[State] = []
     while not (poor and done()):
-        record.problem.contact.limit.several_closures = False            # check the mesh at each gap closure
+        record.problem.contact.limit.predictor = None            # check the mesh at each gap closure
         if poor:
             try:
                 _start_new_mesh(path, remesh, tolerances)
@@ -298,7 +298,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
                     lambda x, names: _moved_out_of_tools(x, names, contacts))
     new_scene = scene_on_new_mesh(mesh, StateTransfer.of(old, state))
     problem = Problem(new_scene)
-    problem.contact.limit.several_closures = False
+    problem.contact.limit.predictor = None
     setting, control = old.setting.transferred(old.description.scales, problem.description.scales, state.control)
     curve = Curve(problem, tolerances)
     x = new_scene.state_transfer.unknowns(problem)

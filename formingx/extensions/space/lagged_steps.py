@@ -89,15 +89,14 @@ class LaggedApproach(Approach):
         """Store the predicted positions at which gaps close; lagged friction needs them for its pressure."""
         self.face.set_closures(places)
 
-    def has_too_many_closures(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
+    def has_too_many_closures(self, a: np.ndarray, b: np.ndarray) -> bool:
         """Return True if a new point is deeper in the tool than twice its tributary length.
-        old, new: locally owned unknowns, shape (n,)."""
-        face = self.face
-        a, b = (face.law.distance(face.positions(f, c)) for f, c in ((old, old_control), (new, control)))
-        deep = np.where(face.law.touching(a, face.history), 0.0, b - 2 * face.rule.lengths)
+        a, b: positions before and after the step, shape (n, 3), length."""
+        law, history = self.face.law, self.face.history
+        deep = np.where(law.touching(a, history), 0.0, law.distance(b) - 2 * self.face.rule.lengths)
         return bool(combined(self._comm, float(deep.max(initial=0.0)), MPI.MAX) > 0)
 
-    def opens_and_closes(self, new: np.ndarray, control: float) -> bool:
+    def opens_and_closes(self, x: np.ndarray) -> bool:
         return False                                        # points open and close between steps only
 
     def _jumps_over(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
