@@ -2,7 +2,9 @@
 
 import ast
 import functools
+import inspect
 import io
+import pkgutil
 import re
 import subprocess
 import sys
@@ -11,6 +13,8 @@ from collections import Counter
 
 import pytest
 from conftest import ROOT
+
+import formingx as fx
 
 PACKAGE = ROOT / "formingx"
 ROOMS = ["_interrupts", "errors", "ranks", "findings", "_jit", "_compat", "units", "io", "figures", "values", "mesh",
@@ -116,28 +120,62 @@ def test_no_class_name_is_defined_twice():
     assert {name for name, n in names.items() if n > 1} == set()
 
 
-INTERNAL = ("solve", "contact", "forms", "problem", "extensions.contact_events")
-MET_BY_USERS = {"LoadedBody", "Face", "Diagnosis"}          # in these rooms: arguments of a user's functions, results
+ALSO_MET = {"LoadedBody", "Face", "Diagnosis", "RigidTool", "PlaneTool"}     # met as arguments
 
 
-def test_docstrings_of_internals_are_no_longer_than_their_code():
-    """Unless they state an equation; interfaces (`Protocol`, abstract methods) have no code."""
-    long = set()
+def met_by_users():
+    """(module, qualified name) of all that users meet: of `fx`, pages, members of these classes, what they return."""
+    pages = "".join(page.read_text() for page in (ROOT / "docs").rglob("*.md"))
+    names = re.findall(r":: (formingx\.[\w.]+)", pages) + [f"{module}.{name}" for module, several in re.findall(
+        r"from (formingx[\w.]*) import ([\w, ]+)", pages) for name in several.replace(" ", "").split(",")]
+    todo = [fx, fx.mesh, fx.tools, *map(pkgutil.resolve_name, names)]
+    classes = {thing.__name__: thing for name, module in sys.modules.items() if name.startswith("formingx")
+               for thing in vars(module).values() if isinstance(thing, type)}
+    todo += map(classes.get, ALSO_MET)
+    met = set()
+    while todo:
+        thing = todo.pop()
+        for wrapper in ("__func__", "fget", "func"):
+            thing = getattr(thing, wrapper, None) or thing
+        thing = inspect.unwrap(thing) if callable(thing) else thing
+        if inspect.ismodule(thing):
+            todo += [v for n, v in vars(thing).items() if n[0] != "_" and not inspect.ismodule(v) and (
+                thing in (fx, fx.mesh, fx.tools) or getattr(v, "__module__", "") == thing.__name__)]
+        key = getattr(thing, "__module__", None) or "", getattr(thing, "__qualname__", "")
+        if not key[0].startswith("formingx") or key in met or not callable(thing):
+            continue
+        met.add(key)
+        said = [getattr(thing, "__annotations__", {}).get("return", "")]
+        if isinstance(thing, type):
+            todo += [*thing.__mro__, *(v for n, v in vars(thing).items()
+                                       if (n[0] != "_" or n[:2] == "__") and not isinstance(v, type))]
+            said = [t for n, t in vars(thing).get("__annotations__", {}).items() if n[0] != "_"]
+        todo += [classes[n] for n in re.findall(r"\w+", str(said)) if n[0] != "_" and n in classes
+                 and not classes[n].__module__.startswith(CORE)]
+    return met
 
-    def visit(file, node, owner):
+
+CORE = tuple(f"formingx.{room}" for room in ("solve", "contact", "forms", "problem", "extensions.contact_events"))
+
+
+def test_docstrings_of_internals_are_short():
+    """No longer than the code, unless they state an equation or belong to an interface; no sections of arguments."""
+    met, long = met_by_users(), set()
+
+    def visit(file, node, owner, prefix):
         for n in ast.iter_child_nodes(node):
             if isinstance(n, ast.FunctionDef) and (said := ast.get_docstring(n, clean=False)) is not None:
-                lines = said.count("\n") + 1
-                first = min([n.lineno, *(d.lineno for d in n.decorator_list)])
+                lines, first = said.count("\n") + 1, min([n.lineno, *(d.lineno for d in n.decorator_list)])
                 interface = "Protocol" in owner or "abstract" in ast.dump(n) or "NotImplementedError" in ast.dump(n)
-                hidden = n.name.startswith("_") and not n.name.startswith("__") or (
-                    name_of(file).startswith(INTERNAL) and not MET_BY_USERS & set(owner))
-                if hidden and not interface and ".. math" not in said and lines > n.end_lineno - first + 1 - lines:
-                    long.add((name_of(file), n.name))
+                if (f"formingx.{name_of(file)}", prefix + n.name) not in met and (
+                        re.search(r"^ *(Args|Returns|Raises):$", said, re.M) or not interface
+                        and ".. math" not in said and lines > n.end_lineno - first + 1 - lines):
+                    long.add((name_of(file), prefix + n.name))
+            named = isinstance(n, ast.ClassDef | ast.FunctionDef)
             bases = [n.name, *(getattr(b, "id", "") for b in n.bases)] if isinstance(n, ast.ClassDef) else owner
-            visit(file, n, bases)
+            visit(file, n, bases, f"{prefix}{n.name}." if named else prefix)
     for file in FILES:
-        visit(file, tree_of(file), [])
+        visit(file, tree_of(file), [], "")
     assert long == set()
 
 

@@ -71,9 +71,8 @@ class Surface(Formulation):
         return self.mesh.faces[name] * self._axes[2], self.dx(metadata={"quadrature_degree": 1})
 
     def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray | float:
-        """Return the forces of pressures on a tool between the m contact points of a face, shape (m, 3).
-        They are 0 without a pressure on a sheet that slides. fields: owned unknowns, shape (n,). Unit: stress
-        length^2."""
+        """Return the pressure forces on a tool between the m contact points of a face, shape (m, 3), stress length^2.
+        They are 0 unless a pressure acts on a sheet that slides. fields: owned unknowns, shape (n,)."""
         return 0.0 if self._on_tools is None else self._on_tools.carried_forces(face, fields, control)
 
     def _residual(self, body: Any) -> tuple[Any, Any, Any]:
