@@ -44,8 +44,10 @@ class _WrongCall(InputError, TypeError):
 
 def explain(module: types.ModuleType) -> None:
     """Make the public functions and classes of a module, and their methods, explain calls with wrong arguments.
+
     A call that fails then raises an `InputError` that names the wrong argument and its type. The functions of `module`,
-    a module of the package, are replaced."""
+    a module of the package, are replaced.
+    """
     for name, item in list(vars(module).items()):
         if name.startswith("_") or not getattr(item, "__module__", "").startswith(_PACKAGE):
             continue
@@ -87,7 +89,9 @@ def _explain_methods(cls: type) -> None:
 
 def _explained(call: Callable, name: str, skip: int) -> Callable:
     """Return a function that calls another function, and turns its errors into messages about wrong arguments.
-    A user does not write the first `skip` arguments (self, cls)."""
+
+    A user does not write the first `skip` arguments (self, cls).
+    """
     if getattr(call, "_is_explained", False) or inspect.isgeneratorfunction(call):
         return call
 
@@ -114,7 +118,9 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
 
 def _fault(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
     """Return the fault in the arguments of a call as text, or None if they fit the signature and its annotations.
-    A user does not write the first `skip` arguments (self, cls)."""
+
+    A user does not write the first `skip` arguments (self, cls).
+    """
     signature = inspect.signature(call)
     try:
         bound = signature.bind(*args, **given).arguments

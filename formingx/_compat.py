@@ -60,7 +60,9 @@ class _Numbered(MultiFunction):
 
 def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
     """Compile UFL forms, the same on all ranks, by one call of the compiler; collective.
-    It takes less time than a call for each. `compile_form` then finds them."""
+
+    It takes less time than a call for each. `compile_form` then finds them.
+    """
     options, form_options = jit.get_options(JIT_OPTIONS), ffcx.get_options({"scalar_type": default_scalar_type})
     if not _jit.supported(options):
         return
@@ -71,7 +73,9 @@ def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
 
 def _compiled_by_jit(request: Callable[[], Any]) -> Any:
     """Return the form or expression that `request` makes by DOLFINx, with `_jit` in place of its compiler.
-    Each form is compiled once in a process."""
+
+    Each form is compiled once in a process.
+    """
     compiler = jit.ffcx_jit
 
     def compile_once(comm: Any, item: Any, form_compiler_options: Any, jit_options: dict[str, Any],
@@ -99,7 +103,9 @@ _made: list[None] = []
 
 def collect_communicators() -> None:
     """Free, now and then, the communicators of meshes and problems that are no longer used; collective.
-    Each new mesh and problem calls it. Objects that refer to each other are freed by a collection of garbage alone."""
+
+    Each new mesh and problem calls it. Objects that refer to each other are freed by a collection of garbage alone.
+    """
     _made.append(None)
     if len(_made) >= _UNCOLLECTED:
         _made.clear()
@@ -108,8 +114,10 @@ def collect_communicators() -> None:
 
 def mesh_of_triangles(comm: Any, cells: Any, points: Any, cell_tags: Any, edges: Any, edge_tags: Any) -> tuple:
     """Return a distributed mesh of triangles, and the `MeshTags` of its cells and facets; collective.
+
     Rank 0 gives cells (m, 3 or 6) in the order of DOLFINx, points (n, 2 or 3), length, cell tags (m,), edges (k, 2 or
-    3) and edge tags (k,)."""
+    3) and edge tags (k,).
+    """
     import basix.ufl
     from dolfinx import graph, mesh
     from dolfinx.io import distribute_entity_data

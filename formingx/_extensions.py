@@ -14,7 +14,9 @@ _FOLDER = Path(__file__).parent / "extensions"
 @contextlib.contextmanager
 def optional() -> Iterator[None]:
     """Skip the import of an extension in a `with` block if its folder is missing.
-    Another missing module is a ModuleNotFoundError."""
+
+    Another missing module is a ModuleNotFoundError.
+    """
     try:
         yield
     except ModuleNotFoundError as error:

@@ -6,7 +6,9 @@ from typing import Any
 
 class OneLine:
     """A `sys.excepthook` that prints an uncaught error of type `kind` as one line, and others as the hook before it.
-    The line is `text`, or the message of the error if that is ""."""
+
+    The line is `text`, or the message of the error if that is "".
+    """
 
     def __init__(self, kind: type[BaseException], text: str = ""):
         self._kind, self._text, self._usual = kind, text, sys.excepthook

@@ -57,8 +57,10 @@ def key(item: Any, jit_options: dict[str, Any], form_options: dict[str, Any]) ->
 def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, Any], form_options: dict[str, Any]
                      ) -> dict[str, tuple[Any, Any, tuple]]:
     """Return compiled forms and expressions; rank 0 builds all missing ones as one library.
+
     Collective. Items are {name by `key`: UFL form, or (expression, points)}, results {name: (object of FFCx, namespace,
-    (None, None))}. A failed compiler, or an item refused on rank 0, is a RuntimeError."""
+    (None, None))}. A failed compiler, or an item refused on rank 0, is a RuntimeError.
+    """
     folder = Path(jit_options["cache_dir"]) / "formingx"
     if comm.rank == 0:
         try:
@@ -77,7 +79,9 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
             ) -> dict[str, Any]:
     """Return {name of the library: result of `_load`} of all items; build the missing libraries.
-    A failed compiler or loading is a RuntimeError."""
+
+    A failed compiler or loading is a RuntimeError.
+    """
     ffi = _declarations(np.dtype(form_options["scalar_type"]).name)
     found = {name: _load(ffi, name, item, folder) for name, item in items.items()}
     if not all(found.values()):
@@ -109,7 +113,9 @@ def _load(ffi: cffi.FFI, name: str, item: Any, folder: Path) -> tuple | None:
 @functools.cache
 def _declarations(scalar: str) -> cffi.FFI:
     """Return the cffi interface with the declarations of the C structures of FFCx for a scalar type, such as "float64".
-    Functions of complex numbers, which cffi cannot declare, take `void *`; Python never calls them."""
+
+    Functions of complex numbers, which cffi cannot declare, take `void *`; Python never calls them.
+    """
     text = (ffcx_jit.UFC_HEADER_DECL.format(scalar) + ffcx_jit.UFC_INTEGRAL_DECL + ffcx_jit.UFC_FORM_DECL
             + ffcx_jit.UFC_EXPRESSION_DECL)
     ffi = cffi.FFI()
@@ -146,7 +152,9 @@ def _c_code(item: Any, name: str, form_options: dict[str, Any]) -> str:
 
 def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
     """Return the path of a shared library of C functions; compile it if the cache does not contain it.
-    No compiler is an InputError, its failure a RuntimeError."""
+
+    No compiler is an InputError, its failure a RuntimeError.
+    """
     compiler = _compiler()
     if compiler is None:
         raise InputError("formingx compiles its equations, and there is no C compiler: install Debian's packages gcc"
@@ -167,8 +175,10 @@ def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
 
 class CFunctions:
     """Functions of a C file of the package, as attributes; the file is compiled when one is first used.
+
     An argument is a number, an array, or None for no array. An array is copied if it is not contiguous or of another
-    type, except where C writes into it: there it must be contiguous, of floats or of integers (long in C)."""
+    type, except where C writes into it: there it must be contiguous, of floats or of integers (long in C).
+    """
 
     def __init__(self, file: str):
         self._file = Path(__file__).parent / file
@@ -267,7 +277,9 @@ def _temporary_folder() -> tempfile.TemporaryDirectory:
 @contextlib.contextmanager
 def _locked(folder: Path, name: str) -> Iterator[None]:
     """Lock the build of the form `name` in a folder within a block; a second process waits, then finds the library.
-    The lock ends with its process. On a file system without locks both processes build."""
+
+    The lock ends with its process. On a file system without locks both processes build.
+    """
     import fcntl
     file = folder / f"{name}.lock"
     with open(file, "w") as lock:

@@ -8,8 +8,10 @@ from mpi4py import MPI
 
 def original(comm: Any) -> Any:
     """Return the communicator whose copy `comm` is, if that is MPI.COMM_WORLD or MPI.COMM_SELF, else `comm`.
+
     Python objects must not be passed on the copy that a DOLFINx object holds: mpi4py 4.0 keeps a lock for it, and if an
-    exception frees the copy, this lock stays locked, and the next one is waited for without end."""
+    exception frees the copy, this lock stays locked, and the next one is waited for without end.
+    """
     return next((known for known in (MPI.COMM_WORLD, MPI.COMM_SELF)
                  if MPI.Comm.Compare(comm, known) in (MPI.IDENT, MPI.CONGRUENT)), comm)
 

@@ -52,12 +52,16 @@ class MeshAdaptation(Protocol):
 
     def make(self, path: Path, options: Mapping[str, float]) -> Mesh:
         """Return a mesh of the same body, adapted to the states of a first run by options of `formingx.mesh.adapted`.
-        The caller has checked the names."""
+
+        The caller has checked the names.
+        """
 
 
 def check_argument(caller: str, argument: str, given: Any, what: str) -> None:
     """Raise an InputError unless the argument `remesh` or `stop_at` of a run is a `RunExtension` for this argument.
-    what: description of the required extension, for the message."""
+
+    what: description of the required extension, for the message.
+    """
     if not isinstance(given, RunExtension) or given.argument != argument:
         raise InputError(f"{caller}: {argument} = {given!r}: must be {what}")
 

@@ -30,9 +30,11 @@ log = logging.getLogger("formingx")
 def run_on_adapted_mesh(caller: str, adapt_mesh: Any, start: Any, resume: bool, scene: Scene, checkpoint: Any,
                         run: Callable[[Scene, Any, bool], Path]) -> Path:
     """Return the path of a run on a mesh that is adapted to a first run, `Path.pilot`, kept in the folder "pilot".
+
     adapt_mesh, start, resume, checkpoint: arguments of `caller`. `run` maps a scene, a checkpoint and `resume` to a
     path. Raise `InputError` for an argument that is not allowed, `ConvergenceError` if the second run failed, or the
-    first with fewer than three states."""
+    first with fewer than three states.
+    """
     if start is not None:
         raise InputError(f"{caller}: adapt_mesh={adapt_mesh!r}: a pilot run begins with the unloaded body and makes"
                          f" the mesh; with start a run continues on its own mesh: give only one of them")
@@ -87,8 +89,10 @@ def check_start(state: State, stages: list[Stage], problem: Problem) -> None:
 def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, allow_inadmissible: bool,
              found: list[Finding], timed: bool = False) -> Path:
     """Return a new path that begins with the states of `start`, a path or a state; None: without states.
+
     columns: the argument `record` of `trace`. found: findings of the checks before the run, which are logged. timed:
-    True if the process time is a column."""
+    True if the process time is a column.
+    """
     record = Record(curve.problem, curve)
     record.findings = found
     log_findings(found, curve.problem.comm.rank)
@@ -113,8 +117,10 @@ def write_checkpoints(path: Path, checkpoint: Any, plans: Sequence[Plan] = ()) -
 def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: Any,
                plans: Sequence[Plan] = ()) -> Any:
     """Return the path that a run continues: `start`, or with `resume` the path in the checkpoint, or None.
+
     caller: name of the calling function, for messages. Raise `InputError` if `resume` is given with `start`, or without
-    a checkpoint, or for other stages."""
+    a checkpoint, or for other stages.
+    """
     if not resume:
         return start
     if checkpoint is None or start is not None:
@@ -131,8 +137,10 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
 @contextlib.contextmanager
 def run_errors(checkpoint: Any = None) -> Iterator[Callable[[Path], Path]]:
     """Attach the path, which the yielded function registers and returns, to the errors of a run in a block.
+
     At the end of the block `path.record.hooks.on_end` are called. `ConvergenceError` (without the traceback of the
-    solver), `InputError`, `Interrupted` and errors of a script's functions, such as a material or a column, pass on."""
+    solver), `InputError`, `Interrupted` and errors of a script's functions, such as a material or a column, pass on.
+    """
     paths: list[Path] = []
 
     def register(path: Path) -> Path:

@@ -295,13 +295,17 @@ class Process:
 
     def _check_tool_paths(self, plan: Plan, travel: Callable[[int], float]) -> None:
         """Check that the tools can move as a stage states, from the travels of items at its start, length.
-        Raise `InputError` if one cannot."""
+
+        Raise `InputError` if one cannot.
+        """
         contacts = {i: travel(i) for i, item in enumerate(self.scene.items) if item in self.scene.contacts}
         clearance.check(self.scene, [plan], contacts)
 
     def _check_stages(self, stages: Any) -> list[Stage]:
         """Return the argument `stages` of `run` as a list.
-        Raise `InputError` if there is no stage, or if two have the same name."""
+
+        Raise `InputError` if there is no stage, or if two have the same name.
+        """
         stages = as_list("Process: stages", stages,
                          "stages, such as Stage('vacuum', control=vacuum, until=pressure(1))")
         if not stages:

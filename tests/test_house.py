@@ -159,17 +159,18 @@ CORE = tuple(f"formingx.{room}" for room in ("solve", "contact", "forms", "probl
 
 
 def test_docstrings_of_internals_are_short():
-    """At most 7 lines, no more than the code, but for equations and interfaces; no sections of arguments."""
+    """At most 7 lines of text, no more than of code, but for equations and interfaces; no sections of arguments."""
     met, long = met_by_users(), set()
 
     def visit(file, node, owner, prefix):
         for n in ast.iter_child_nodes(node):
             if isinstance(n, ast.FunctionDef) and (said := ast.get_docstring(n, clean=False)) is not None:
-                lines, first = said.count("\n") + 1, min([n.lineno, *(d.lineno for d in n.decorator_list)])
+                text = sum(bool(line.strip()) for line in said.split("\n"))
+                code = n.end_lineno - min([n.lineno, *(d.lineno for d in n.decorator_list)]) - said.count("\n")
                 interface = "Protocol" in owner or "abstract" in ast.dump(n) or "NotImplementedError" in ast.dump(n)
                 if (f"formingx.{name_of(file)}", prefix + n.name) not in met and (
                         re.search(r"^ *(Args|Returns|Raises):$", said, re.M) or not interface
-                        and ".. math" not in said and lines > min(7, n.end_lineno - first + 1 - lines)):
+                        and ".. math" not in said and text > min(7, code)):
                     long.add((name_of(file), prefix + n.name))
             named = isinstance(n, ast.ClassDef | ast.FunctionDef)
             bases = [n.name, *(getattr(b, "id", "") for b in n.bases)] if isinstance(n, ast.ClassDef) else owner

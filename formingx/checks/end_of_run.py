@@ -28,9 +28,11 @@ def volumes(path: Any) -> Iterator[Finding]:
 @register("end")
 def contact(path: Any) -> Iterator[Finding]:
     """Report inaccurate contact in a `Path`; collective.
+
     The causes are penetration that changes tool forces, coarse elements at edges of tools, sticking points that
     separate and stick again elsewhere, tools off which the sheet is peeled, and faces that crease between sticking
-    points."""
+    points.
+    """
     moved = resticking.furthest(path)
     yield from path._view(path.record.segments[-1]).admissibility.findings(path.last)
     yield from edges.findings(edges.coarsest(path, path.last))

@@ -8,7 +8,9 @@ import numpy as np
 
 def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
     """Yield (target or mould as text, stretch) that a flat axisymmetric sheet is expected to reach.
-    A target gives the pole stretch of a free spherical cap, a closed mould the square root of the areal draw ratio."""
+
+    A target gives the pole stretch of a free spherical cap, a closed mould the square root of the areal draw ratio.
+    """
     for face in body.pressurised_faces:
         if not face.flat or not face.axisymmetric:
             continue
@@ -23,11 +25,13 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
 
 def _cap_stretch(target: Any, radius: float) -> float | None:
     r"""Return the pole stretch of a disc of radius a, inflated to a spherical cap of height H that meets a target.
+
     The points of the thin disc move at right angles to the successive caps, so
 
     .. math:: \lambda = 1 + (H / a)^2
 
-    The target is a pole stretch, a pole height or an enclosed volume; for any other None is returned."""
+    The target is a pole stretch, a pole height or an enclosed volume; for any other None is returned.
+    """
     if target.name == "pole_stretch":
         return float(target.value)
     height = abs(target.value) / radius

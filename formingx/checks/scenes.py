@@ -32,7 +32,9 @@ def _driven(body: SizedBody) -> Iterator[Finding]:
 @register("scene")
 def _edges(body: SizedBody) -> Iterator[Finding]:
     """Report edges without a support of a sheet in three dimensions.
-    A flat membrane has no stiffness normal to its plane."""
+
+    A flat membrane has no stiffness normal to its plane.
+    """
     if body.scene.kinematics.components == 3:
         mesh: Any = body.scene.mesh
         supported = {support.on for support in body.scene.supports}
@@ -59,7 +61,9 @@ def _symmetry(body: SizedBody) -> Iterator[Finding]:
 @register("scene")
 def _hinged_edges(body: SizedBody) -> Iterator[Finding]:
     """Report sharp edges of tools with friction at the edge of a hinged face.
-    The face rotates, so its edge leaves the tool, unless it sticks. The direction of the contact is round-off there."""
+
+    The face rotates, so its edge leaves the tool, unless it sticks. The direction of the contact is round-off there.
+    """
     hinged = [body.scene.mesh.nodes_of(support.on) for support in body.scene.supports
               if isinstance(support, SimplySupported)]
     for contact in body.scene.contacts if hinged else ():
@@ -99,8 +103,10 @@ def _locking(body: SizedBody) -> Iterator[Finding]:
 @register("scene")
 def _layers(body: SizedBody) -> Iterator[Finding]:
     """Report a thick layer with one element through it, which cannot bend, and layers of very different shear modulus.
+
     Long elements of a soft layer misrepresent its shear at a rim: with a layer 1000 times softer the stretch jumped by
-    66 % between elements of 2.5 thicknesses, by 30 % between shorter ones, however many lie through the layer."""
+    66 % between elements of 2.5 thicknesses, by 30 % between shorter ones, however many lie through the layer.
+    """
     if not body.scene.model.solid:
         return
     scene = body.scene
@@ -162,9 +168,11 @@ def _n_owned(scene: Scene, facets: np.ndarray) -> int:
 
 @register("scene")
 def _contact_penalties(body: SizedBody) -> Iterator[Finding]:
-    """Report contact penalties that are so small that faces penetrate, or so large that round-off grows, and wide
-    ramps. The penetration over the thickness is about p / (k mu), with the traction p, the shear modulus mu and the
-    penalty k of the `Contact`. A ramp is wide above 0.05 times the thickness."""
+    """Report contact penalties with which faces penetrate or round-off grows, and wide ramps.
+
+    The penetration over the thickness is about p / (k mu), with the traction p, the shear modulus mu and the penalty k
+    of the `Contact`. A ramp is wide above 0.05 times the thickness.
+    """
     stress = max(body.moduli.values())
     pressed = body.scene.driven is not None and body.scene.driven.quantity == "pressure"
     presses = [abs(t.value) for t in body.targets if t.name.endswith("pressure")] if pressed else []
@@ -189,6 +197,7 @@ def _contact_penalties(body: SizedBody) -> Iterator[Finding]:
 @register("scene")
 def _volume_penalty(body: SizedBody) -> Iterator[Finding]:
     r"""Report a volume penalty eps with a volume change above 1 %, or with a tangent that is known to fail.
+
     At a stretch lambda the pressure is about mu lambda^2, with the shear modulus mu, and the bulk modulus is 8 mu/eps.
     So the relative change of volume is about
 

@@ -19,7 +19,9 @@ from .check import Report, check
 
 class _DryRun(BaseException):
     """Exception raised in place of the first run of a script.
-    It is not an `Exception`, so that a script does not catch it."""
+
+    It is not an `Exception`, so that a script does not catch it.
+    """
 
     def __init__(self, report: Report):
         super().__init__()
@@ -28,8 +30,10 @@ class _DryRun(BaseException):
 
 def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
     """Return the findings on the first scene that a Python script runs; nothing is solved.
+
     The code before its first run is executed, calls of `formingx.heat` included. A missing file, a script without a
-    run, or a refused scene is an InputError."""
+    run, or a refused scene is an InputError.
+    """
     file = file_path("check: script", script)
     if not file.is_file():
         raise InputError(f"check: script {str(file)!r} is not there")
@@ -59,7 +63,9 @@ def _check_python(file: Path) -> None:
 @contextmanager
 def _no_runs() -> Iterator[None]:
     """Replace functions that run a scene, such as `trace`, by a check of the scene within a `with` block.
-    After the check, the replacement raises `_DryRun`."""
+
+    After the check, the replacement raises `_DryRun`.
+    """
     def trace(scene, *, until, intermediate=(), **_):
         raise _DryRun(check(scene, targets=[*intermediate, until]))
 

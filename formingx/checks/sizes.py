@@ -93,7 +93,9 @@ class SizedBody(Triangles):
 
     def _prescribed_values(self, target: Target, control: Any) -> list[PrescribedValue]:
         """Return a list with the prescribed value of a target that is a pressure or a travel; else an empty list.
-        A target without a name belongs to the `control` of the run."""
+
+        A target without a name belongs to the `control` of the run.
+        """
         name, _, quantity = str(target.name).rpartition("_")
         if quantity not in ("pressure", "travel"):
             return []
@@ -147,8 +149,10 @@ class PressurisedFace:
     @cached_property
     def mould_points(self) -> tuple[np.ndarray, np.ndarray]:
         """Points of the opposite face, and the points at which they would meet the tools, shape (n, 2) each, length.
+
         Each point is moved along the normal of the sheet, away from the face under pressure. If it meets no tool, its
-        row in the second array is infinite."""
+        row in the second array is infinite.
+        """
         points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
         points, directions = outward_directions(points, self.line)
         limit = 100 * self._body.length
@@ -158,7 +162,9 @@ class PressurisedFace:
 
     def peak(self) -> Peak | None:
         """Return the first pressure maximum in the inflation of the flat sheet or tube without tools.
-        It has the pole or hoop stretch; None without a maximum, in plane strain or for variable materials."""
+
+        It has the pole or hoop stretch; None without a maximum, in plane strain or for variable materials.
+        """
         materials = self._body.scene.materials
         if not self.axisymmetric or not (self.tall or self.flat) or any(m.varies for m in materials.values()):
             return None
@@ -167,7 +173,9 @@ class PressurisedFace:
 
     def remaining_pressure(self, blow_ratio: float) -> tuple[float, Peak] | None:
         """Return the lowest pressure of a free tube from its maximum to the blow ratio, over it, and this maximum.
-        The blow ratio is the radius of mould over parison. None without a maximum below it."""
+
+        The blow ratio is the radius of mould over parison. None without a maximum below it.
+        """
         peak = self.peak()
         if peak is None or peak.stretch >= blow_ratio:
             return None
@@ -207,7 +215,9 @@ def _pressures(body: SizedBody) -> Found:
 @register("scene")
 def _limit_pressures(body: SizedBody) -> Found:
     """Report pressures above the pressure maximum of a sheet or tube without tools.
-    Materials that stiffen enough have no such maximum."""
+
+    Materials that stiffen enough have no such maximum.
+    """
     for face in body.pressurised_faces:
         if body.scene.contacts or (peak := face.peak()) is None:
             continue
@@ -223,8 +233,10 @@ def _limit_pressures(body: SizedBody) -> Found:
 @register("scene")
 def _blow_ratio(body: SizedBody) -> Found:
     """Report a tube that is blown into a mould that is too wide for it.
+
     Its radius grows more than 8-fold, or the estimated pressure of a uniform tube falls below 0.8 times its maximum on
-    the way to the mould, so that it bulges locally."""
+    the way to the mould, so that it bulges locally.
+    """
     for face in body.pressurised_faces:
         if not (face.tools and face.tall and face.axisymmetric):
             continue
@@ -249,8 +261,10 @@ def _blow_ratio(body: SizedBody) -> Found:
 @register("scene")
 def _open_moulds(body: SizedBody) -> Found:
     """Report an open mould: parts of the sheet meet no tool along their normal, and would be blown past its end.
+
     For this a pressure of the run is larger than a free sheet bears, or the mould is deep and no target ends the
-    run."""
+    run.
+    """
     for face in body.pressurised_faces:
         if not face.tools:
             continue
@@ -344,8 +358,10 @@ def _tool_paths(body: SizedBody) -> Found:
 def _gaps(faces: list[tuple[Tool, np.ndarray]], direction: Any, start: float, travel_range: float,
           tolerance: float) -> np.ndarray:
     """Return the smallest gap between tools and undeformed faces at n increasing travels, shape (n,), length.
+
     The travel grows by half the gap, at least `tolerance`, to the first touch or `travel_range`. Faces are (tool, nodes
-    (n, c))."""
+    (n, c)).
+    """
     travel, gaps, speed = 0.0, [start], float(np.linalg.norm(direction))
     while travel < travel_range and (len(gaps) == 1 or gaps[-1] > min(tolerance, start)):
         travel = min(travel + max(gaps[-1] / 2, tolerance) / speed, travel_range)
@@ -361,7 +377,9 @@ def _gap(faces: list[tuple[Tool, np.ndarray]], direction: Any, travel: float) ->
 @register("scene")
 def _sharp_edges(body: SizedBody) -> Found:
     """Report sharp convex edges of moving tools over which a body with two or more rows of elements may slide.
-    The tool force then depends on the positions of the nodes (tests/test_check.py)."""
+
+    The tool force then depends on the positions of the nodes (tests/test_check.py).
+    """
     for contact in body.scene.contacts:
         if contact.tool.components == 3:
             continue

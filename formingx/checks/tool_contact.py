@@ -18,7 +18,9 @@ from .mould_side import moulds
 @register("end")
 def untouched(path: Any) -> Iterator[Finding]:
     """Yield warnings on active tools never touched, and moulds from which the body moved away; collective.
-    A remeshed run has no findings."""
+
+    A remeshed run has no findings.
+    """
     segment = path.record.segments[-1]
     problem, states = segment.problem, segment.states
     if len(path.record.segments) > 1 or len(states) < 2:            # after remeshing the earlier states are missing
@@ -55,7 +57,9 @@ def untouched(path: Any) -> Iterator[Finding]:
 
 def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
     """Return the states in which to examine the contact of a tool, the most promising first.
-    The last state with a force comes first; states with touch follow."""
+
+    The last state with a force comes first; states with touch follow.
+    """
     column = Tooling.of_problem(path.problem).force_columns.get(name, "")
     forced = [state for state in states if state.measures.get(column)]
     touching = [state for state in states if state.measures.get("contact_length", state.measures.get("contact_area"))]
@@ -75,9 +79,11 @@ def _touches(problem: Any, state: Any, contacts: list[Any]) -> bool:
 
 
 def _distances(problem: Any, state: Any, contacts: list[Any]) -> np.ndarray:
-    """Return the gaps at the contact points of `FaceContact` objects in a state, shape (n,), length, negative inside a
-    tool. The points of all ranks are included, except those of prescribed position (a rim held on a flange touches
-    nothing), unless there are no others; collective."""
+    """Return gaps at contact points of `FaceContact` objects, shape (n,), length, negative inside a tool; collective.
+
+    The points of all ranks are included, except those of prescribed position (a rim held on a flange touches nothing),
+    unless there are no others.
+    """
     with problem.state_context(state):
         gaps = [-contact.contact.tool.signed_distance(contact.positions(state.x, state.control))
                 for contact in contacts]

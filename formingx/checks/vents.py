@@ -13,8 +13,10 @@ from .sizes import SizedBody
 @register("start")
 def peeling(body: SizedBody) -> Iterator[Finding]:
     """Report stages that remove the pressure from a relaxing sheet that sticks to a mould and may separate from it.
+
     The points of the relaxed sheet separate one by one, stick again beside their first places, and separate again. At
-    the end the part is as without the mould, after many times as many states (tests/test_vents.py)."""
+    the end the part is as without the mould, after many times as many states (tests/test_vents.py).
+    """
     scene = body.scene
     if not any(material.internal or material.integral for material in scene.materials.values()):
         return

@@ -125,7 +125,9 @@ class Increment:
 
     def after(self, motion: np.ndarray) -> Tractions:
         """Return the law linearised after a further motion y of the points, shape (n, c), length.
-        Its traction f and stiffness S are those before the motion; after it the traction is f + S y."""
+
+        Its traction f and stiffness S are those before the motion; after it the traction is f + S y.
+        """
         assert self._before is not None
         return self._law.tractions(self._last_x, self._history, None, self._before.to(self._last_x + motion))
 
@@ -137,7 +139,9 @@ class Increment:
     @property
     def ramp_normal(self) -> np.ndarray:
         """Normal times the width of the ramp, along which sticking points stop at its edge, shape (n, c), length.
-        It is 0 for points that slide, adhere or have no friction."""
+
+        It is 0 for points that slide, adhere or have no friction.
+        """
         assert self._before is not None
         law = self._law
         sticks = np.reshape(law.has_friction and not law.adhesive and law.sticks, (-1, 1))
@@ -210,7 +214,9 @@ class FaceContact:
 
     def shift_distances(self, shift: np.ndarray) -> None:
         """Reduce the distances from the tool by `shift`, shape (n,), length.
-        A remeshed body thus keeps its pressures."""
+
+        A remeshed body thus keeps its pressures.
+        """
         self.shift = shift
         self.law = self._law(self._penalty)
 
@@ -234,7 +240,9 @@ class FaceContact:
 
     def relative_motion(self, dx: np.ndarray, step: np.ndarray | float) -> np.ndarray:
         """Return the motion relative to the tool by dx, shape (m,) or (m, k), and step.
-        The shape is (n, components) or (n, components, k), in length."""
+
+        The shape is (n, components) or (n, components, k), in length.
+        """
         motion = self._length * self.displacement(dx)
         return motion - np.multiply.outer(self._travel_vector, self._rate * step) if self._rate else motion
 
@@ -263,7 +271,9 @@ class FaceContact:
 
     def forces(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the forces on the tool near the points, shape (n, components), stress length^2; collective.
-        They are contact forces and, in three dimensions, pressure on the tool between points. fields: owned."""
+
+        They are contact forces and, in three dimensions, pressure on the tool between points. fields: owned.
+        """
         between = self._solid.carried_forces(self, fields, control)
         return self.area[:, None] * self.tractions(fields, control).force + between
 
@@ -289,7 +299,9 @@ class FaceContact:
 
     def tangent(self, fields: np.ndarray, control: float, one_sided: bool = False) -> np.ndarray:
         """Return and store the derivative of the nodal forces by the m unknowns of each point, shape (n, m, m).
-        one_sided: True gives points whose gap just closed the stiffness of deeper contact, in place of 0."""
+
+        one_sided: True gives points whose gap just closed the stiffness of deeper contact, in place of 0.
+        """
         self._in_tangent = self._stiffness(fields, control, one_sided)
         return self._of_unknowns(self._in_tangent)
 
@@ -311,7 +323,9 @@ class FaceContact:
 
     def one_sided_change(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the one-sided stiffness of the points minus that in the last tangent, stress/length, 0 if negligible.
-        Shape (n, components, components)."""
+
+        Shape (n, components, components).
+        """
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = NEGLIGIBLE * np.abs(self._in_tangent).max((1, 2), keepdims=True)
         return np.where(np.abs(change).max((1, 2), keepdims=True) > least, change, 0.0)

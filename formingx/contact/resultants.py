@@ -41,7 +41,9 @@ def area(face: FaceContact, fields: np.ndarray, control: float) -> float:
 
 def force(face: FaceContact, fields: np.ndarray, control: float) -> np.ndarray:
     """Return the contact force of the body on the tool, shape (components,), stress length^2 (per depth stress length).
-    The axisymmetric r entry is the radial traction over the circumference, no resultant."""
+
+    The axisymmetric r entry is the radial traction over the circumference, no resultant.
+    """
     total = face.forces(fields, control).sum(0) - face.unbalanced
     return np.asarray(combined(face.comm, total, MPI.SUM))
 

@@ -300,7 +300,8 @@ class Gauss:
 def _along(edges: np.ndarray) -> np.ndarray:
     """Return dx/ds at the first end, the second end and the middle of edges, shape (m, 3, components).
 
-    edges: positions of these three nodes of m edges, same shape, length. s increases from 0 to 1 along an edge."""
+    edges: positions of these three nodes of m edges, same shape, length. s increases from 0 to 1 along an edge.
+    """
     a, b, m = edges.transpose(1, 0, 2)
     return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)
 

@@ -110,7 +110,9 @@ class Approach:
 
     def _within_motion(self, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> float:
         """Return the arc length within which a tangent predicts gap closures; by default `length`.
-        start, velocity: positions of points and d/ds, shape (n, c). free: mask of the open ones."""
+
+        start, velocity: positions of points and d/ds, shape (n, c). free: mask of the open ones.
+        """
         return length
 
     def closures(self, fields: np.ndarray, control: float, direction: np.ndarray, slope: float,
@@ -405,7 +407,9 @@ class StepLimit:
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> StepRejection | None:
         """Return reason and admissible fraction of a solved step that was too long for the contacts, or None.
-        `ends`: see `Approach.rejection`."""
+
+        `ends`: see `Approach.rejection`.
+        """
         found = [c.rejection(old, new, self._n, length, ends) for c in self.active_contacts]
         return min(filter(None, found), key=lambda rejection: rejection.fraction, default=None)
 

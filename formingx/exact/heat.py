@@ -96,7 +96,8 @@ def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callab
 
     .. math:: -k T_s'' = q, \qquad k T_s'(0) = h_0 (T_s(0) - T_{air,0}), \qquad -k T_s'(d) = h_1 (T_s(d) - T_{air,1})
 
-    h and air have values of both faces; q is a function of x, power/length^3, or None."""
+    h and air have values of both faces; q is a function of x, power/length^3, or None.
+    """
     d, k = slab.thickness, slab.conductivity
     nodes, weights = np.polynomial.legendre.leggauss(60)
 
@@ -168,7 +169,8 @@ def _talbot(transformed: Callable, t: float, n: int = 20) -> np.ndarray:
 
     .. math:: \sigma_k = \theta_k + (\theta_k \cot\theta_k - 1) \cot\theta_k, \quad \theta_k = \frac{k \pi}{n}
 
-    (Abate and Valko 2004.) `transformed` is a function of a complex number s that returns the m transforms."""
+    (Abate and Valko 2004.) `transformed` is a function of a complex number s that returns the m transforms.
+    """
     theta = np.arange(1, n) * np.pi / n
     r = 2 * n / (5 * t)
     cot = 1 / np.tan(theta)
@@ -207,8 +209,10 @@ def method_of_lines(slab: Slab, start: float, fluxes: tuple[Callable, Callable],
 def _finite_volumes(slab: Slab, start: float, fluxes: tuple, times: Any, cells: int,
                     source: Callable | None) -> np.ndarray:
     """Return the temperatures at the nodes of a slab at k times, by finite volumes, shape (k, cells + 1).
+
     Two functions of the face temperature give the fluxes into the faces, power/length^2; the source, power/length^3, is
-    one of position. Times ascend, (k,)."""
+    one of position. Times ascend, (k,).
+    """
     from scipy.integrate import solve_ivp
     from scipy.sparse import diags
     n, dx = cells + 1, slab.thickness / cells

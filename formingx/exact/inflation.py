@@ -150,7 +150,8 @@ def _varying_membrane(pole_stretch: float, radius: float, thickness: float, c10:
     the meridian and lambda_1 its stretch. R and r are the reference and deformed radius. The pole stretch increases in
     steps. The secant method finds the pressure of each step, for which the circumferential stretch is 1 at the rim.
     Lengths are in the reference configuration, c10 is a function of R, and both constants are stresses. A search
-    without pressure raises an InputError."""
+    without pressure raises an InputError.
+    """
     from scipy.integrate import solve_ivp
     from scipy.optimize import root_scalar
     unit = positive("c10 at R = 0", float(c10(0.0)))       # lengths over radius, tensions over 2 c10(0) h0

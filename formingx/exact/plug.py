@@ -154,8 +154,10 @@ def membrane_under_plug(travel: float, *, radius: float, plug_radius: float, thi
 def _continuation(derivatives: Callable, ends: Callable, s: np.ndarray, y: np.ndarray, p: list, depth: float,
                   goal: float, radius: float) -> Any:
     """Return the solution of a boundary value problem at a travel by `solve_bvp`, in steps from a smaller travel.
+
     `derivatives` maps (s, y, p) to dy/ds, (3, n), and `ends` (travel, y(0), y(1), p) to residuals. The guess has s
-    (n,), y (3, n) and parameters p; travels are over the radius. A step that fails is an InputError."""
+    (n,), y (3, n) and parameters p; travels are over the radius. A step that fails is an InputError.
+    """
     from scipy.integrate import solve_bvp
     while True:
         found = solve_bvp(derivatives, functools.partial(ends, depth), s, y, p, tol=1e-6, max_nodes=5000)
@@ -257,7 +259,8 @@ def _tensions(t: float, l2: float) -> tuple[float, float]:
     .. math:: T_1 = \frac{\lambda_1}{\lambda_2} - (\lambda_1 \lambda_2)^{-3}, \qquad
               T_2 = \frac{\lambda_2}{\lambda_1} - (\lambda_1 \lambda_2)^{-3}
 
-    Tensions are per deformed length, over 2 c10 h0 (h0: reference thickness)."""
+    Tensions are per deformed length, over 2 c10 h0 (h0: reference thickness).
+    """
     l1 = meridional_stretch(t * l2, l2)
     return l1, l2 / l1 - (l1 * l2)**-3
 
@@ -275,8 +278,10 @@ def _integrate(length: float, y: np.ndarray, derivatives: Callable, **options: A
 
 def _contact_derivatives(mu: float, h0: float = 0.0, fillet: float = np.inf) -> Callable:
     """Return a function of (R, r, z, phi, T1) that gives the derivatives of the five by arc length, in this order.
+
     It holds in contact with edge or side of the plug (`membrane_sliding_over_plug`). Lengths are over the reference
-    radius, tensions over 2 c10 h0; the side has h0 = 0 and an infinite fillet."""
+    radius, tensions over 2 c10 h0; the side has h0 = 0 and an infinite fillet.
+    """
     def derivatives(R, r, z, phi, t):
         l1, t2 = _tensions(t, r / R)
         half = h0 * R / (l1 * r) / 2                        # half of the thickness
@@ -292,6 +297,7 @@ def _free_derivatives(R: float, r: float, z: float, phi: float, t: float) -> lis
     .. math:: \frac{d\phi}{ds} = -\frac{T_2}{T_1} \frac{\sin\phi}{r}, \qquad
               \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r}, \qquad ds = \lambda_1 dR
 
-    Lengths are over the reference radius of the membrane, t is T1 over 2 c10 h0, and phi is in radians."""
+    Lengths are over the reference radius of the membrane, t is T1 over 2 c10 h0, and phi is in radians.
+    """
     l1, t2 = _tensions(t, r / R)
     return [1, l1 * np.cos(phi), l1 * np.sin(phi), -l1 * t2 / t * np.sin(phi) / r, l1 * (t2 - t) * np.cos(phi) / r]

@@ -186,7 +186,8 @@ def _pressure(ratio: float, inner: float, stretch: float) -> float:
 
     P_A and P_B are the pressures on the inner and outer face with the reference radii A and B. At the reference radius
     R the deformed radius is r, and b_theta and b_r are squared stretches. mu is the shear modulus. `inner` is the
-    deformed over the reference inner radius."""
+    deformed over the reference inner radius.
+    """
     nodes, weights = np.polynomial.legendre.leggauss(60)
     R, w = ratio + (1 - ratio) * (nodes + 1) / 2, weights * (1 - ratio) / 2
     r = np.sqrt((inner * ratio) ** 2 + (R**2 - ratio**2) / stretch)
@@ -202,7 +203,8 @@ def _determinant(ratio: float, inner: float, n: int, k: float, outside: bool) ->
     Three motions v with amplitudes U, V, W, functions of r, satisfy incremental equilibrium and the boundary conditions
     on the inner face. Each motion has three errors in the boundary conditions on the outer face, along r, theta and z.
     The errors form the determinant: a row for each condition, a column for each motion. `inner` is the deformed over
-    the reference inner radius; k is multiplied by the outer reference radius. `outside` is the side of the fluid."""
+    the reference inner radius; k is multiplied by the outer reference radius. `outside` is the side of the fluid.
+    """
     A, a = ratio, inner * ratio
     b = np.sqrt(a**2 + 1 - A**2)
     delta = _pressure(ratio, inner, 1.0)                             # outer less inner pressure

@@ -228,7 +228,8 @@ class ThickBody:
         Sums without limits are over the n points. There c(s) is the weight of the load, e(s) the strain of the body and
         T the stress difference; a prime is a derivative by s. Sums over k are over the branches, with the shear moduli
         mu_k and the elastic strains w. The rates at which these decrease by relaxation are rho. The elastic strains
-        have shape (n, branches, 3)."""
+        have shape (n, branches, 3).
+        """
         (e, de), (c, dc), d = self.strain(s), self.weight(s), self.direction
         m, l2 = np.exp(2 * w), np.exp(2 * e[:, None] * self.direction)
         stiffness = 4 * self.c10 * (d[0] * l2[:, 0] - d[2] * l2[:, 2])
@@ -239,8 +240,10 @@ class ThickBody:
 
     def _integrate(self, rate: Callable, start: np.ndarray, times: Any) -> np.ndarray:
         """Return the solution of an initial value problem at n times, shape (n, k), and update the present time.
+
         `rate` maps (time, solution) to derivatives, (k,). A solution that ends before the last time is an
-        InputError."""
+        InputError.
+        """
         from scipy.integrate import solve_ivp
         found = solve_ivp(rate, (self.time, times[-1]), start, method="DOP853", t_eval=times, **_TOLERANCES)
         if not found.success:

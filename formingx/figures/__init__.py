@@ -21,8 +21,11 @@ class Axes(Protocol):
 
 def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
            rows: int = 1) -> tuple[Any, Any]:
-    """Return an empty matplotlib figure with `columns` x `rows` plots of a size in inches, and its axes, row by row, or
-    one. ratios: relative widths of the columns, default equal. Saving the figure needs no screen."""
+    """Return an empty matplotlib figure with `columns` x `rows` plots of a size in inches, and its axes.
+
+    The axes are in a list, row by row, or one. ratios: relative widths of the columns, default equal. Saving the figure
+    needs no screen.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     from .notebook import ShownAxes, ShownFigure
@@ -39,8 +42,10 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
 
 def new_axes() -> Any:
     """Return the axes of a new figure with one plot.
+
     If the script uses `matplotlib.pyplot`, the figure is its current one (`plt.gcf()`); not in a notebook, which shows
-    the returned axes."""
+    the returned axes.
+    """
     pyplot = sys.modules.get("matplotlib.pyplot")
     drawing, axes = figure()
     if pyplot is not None and "ipykernel" not in sys.modules:
@@ -56,7 +61,9 @@ def new_axes() -> Any:
 
 def pyvista() -> Any:
     """Return the module pyvista, imported without `matplotlib.pyplot`, which is slow to import.
-    pyvista needs pyplot only for charts; a placeholder module imports pyplot at its first use."""
+
+    pyvista needs pyplot only for charts; a placeholder module imports pyplot at its first use.
+    """
     name = "matplotlib.pyplot"
     if "pyvista" not in sys.modules and name not in sys.modules:
         sys.modules[name] = _LoadedWhenUsed(name)
@@ -78,8 +85,10 @@ class _LoadedWhenUsed(types.ModuleType):
 
 def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> None:
     """Draw the sections of rigid tools in grey, within a box from `low` to `high`, (r, z), length.
+
     placed: (`Tool`, its displacement (r, z), length) of each. mirror: True to draw their mirror images at r = 0,
-    too."""
+    too.
+    """
     box = np.array([low, high], dtype=float)
     n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)
     r, z = (np.linspace(box[0, k], box[1, k], n[k]) for k in (0, 1))

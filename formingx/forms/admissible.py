@@ -36,6 +36,7 @@ class WorstValue(NamedTuple):
 
 class Admissible:
     r"""Admissibility check of a deformed body: its hoop stretches and in-plane determinants must be positive.
+
     They are evaluated at the quadrature points of the energy, at points of the next degree, and at edge midpoints.
 
     .. math:: \lambda_\theta = 1 + u_r / R, \qquad
@@ -78,7 +79,9 @@ class Admissible:
 
     def minimum(self) -> WorstValue:
         """Return the smallest hoop stretch or in-plane determinant, or the first that is not finite; collective.
-        It belongs to the current field, with its reference position."""
+
+        It belongs to the current field, with its reference position.
+        """
         found = [WorstValue("in-plane determinant", np.inf, (0.0, 0.0))]
         for quantity, values in self.quantities().items():
             if values.size:
@@ -100,7 +103,9 @@ class Admissible:
 
     def volume_error_away(self, places: np.ndarray, distance: float) -> float:
         """Return the volume-weighted root mean square of J - 1 away from places, shape (k, 2), length; collective.
-        Elements with a quadrature point within `distance` are left out; 0 if none is left."""
+
+        Elements with a quadrature point within `distance` are left out; 0 if none is left.
+        """
         X, n = self._X[:, : self._n], self._n
         J = np.prod(list(self.quantities().values()), axis=0)[:, :n]
         near = np.min([np.hypot(*(X - place).transpose(2, 0, 1)).min(1) for place in places], axis=0) < distance
@@ -117,8 +122,10 @@ class Admissible:
 
     def holds(self) -> bool:
         """Return True if no point has crossed the axis and no element is inverted, for the current field; collective.
+
         In-plane determinants are checked at quadrature points of the energy only. Between them a sharp edge may invert
-        a bent element without harm, as under a plug. `minimum` finds such points."""
+        a bent element without harm, as under a plug. `minimum` finds such points.
+        """
         found = self.quantities()
         mine = all([bool(np.all((values if quantity == "hoop stretch" else values[:, :self._n]) > 0))
                     for quantity, values in found.items()])
@@ -136,7 +143,9 @@ class Admissible:
 
     def quantities(self) -> dict[str, np.ndarray]:
         """Return {"in-plane determinant": values, "hoop stretch": values} in owned cells, shape (cells, points) each.
-        A membrane has no determinant, plane strain no hoop stretch."""
+
+        A membrane has no determinant, plane strain no hoop stretch.
+        """
         w, size = self._forms.w.x.array, self._forms.length
         if np.array_equal(w, self._known[0]):               # checks of a state follow each other
             return self._known[1]

@@ -53,6 +53,7 @@ class Active(NamedTuple):
 
 class Constraints:
     """All constraints that the supports of a scene can impose; a support where the mesh has no node is an InputError.
+
     assemble: function that assembles a compiled linear form and returns its locally owned entries.
 
     Attributes:
@@ -89,7 +90,9 @@ class Constraints:
 
     def active(self, inactive: set[int]) -> Active:
         """Return the constraints that are active while the items `inactive` of `Scene.items` are not.
-        If one support fixes an unknown and another one moves it, the unknown follows the moving support."""
+
+        If one support fixes an unknown and another one moves it, the unknown follows the moving support.
+        """
         entries = [entry for entry in self.entries if entry.item not in inactive]
         numbers = np.concatenate([np.zeros(0, dtype=np.int32), *(e.dofs for e in entries)])
         drivers = np.concatenate([np.zeros(0, dtype=int),
@@ -105,7 +108,9 @@ class Constraints:
 
     def _dofs_of(self, support: Any, sub: Any, item: Constrained) -> np.ndarray:
         """Return the local numbers of the unknowns that a constraint prescribes, with ghosts, shape (n,).
-        sub: subspace of the displacement component. Raise `InputError` if the mesh has no node at the point."""
+
+        sub: subspace of the displacement component. Raise `InputError` if the mesh has no node at the point.
+        """
         forms = self._forms
         if item.on is not None:
             return fem.locate_dofs_topological(sub, forms.mesh.facets.dim, forms.mesh.facets_of(item.on))

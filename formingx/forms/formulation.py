@@ -37,6 +37,7 @@ from .temperature import Temperature
 
 class Formulation(ABC):
     """Fields and variational forms (UFL) of a model declaration (`Scene`), without contact.
+
     Displacements are divided by `length`, pressures by `stress`, and the residual by stress times volume.
 
     Attributes:
@@ -168,7 +169,9 @@ class Formulation(ABC):
 
     def _residual(self, body: LoadedBody) -> tuple[Any, Any, Any]:
         """Return the residual and its derivatives by the control, through loads and through time (UFL, rank 1).
-        body: fields and integrals for the virtual works. A derivative that the scene does not have is None."""
+
+        body: fields and integrals for the virtual works. A derivative that the scene does not have is None.
+        """
         v, control = self.test_function(), self._control
         residual = ufl.derivative(self.potential, self.w, v)
         for entry in self.terms:
@@ -348,18 +351,24 @@ class Formulation(ABC):
     @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
         """Return the points on the mesh of the fields for points of the body, shape (n, 2), length.
-        For a solid they are the points themselves, for a membrane those of the mid-surface at the same R."""
+
+        For a solid they are the points themselves, for a membrane those of the mid-surface at the same R.
+        """
 
     @abstractmethod
     def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:
         """Return the integral of a density (UFL scalar) over the reference volume of layers; per depth in plane strain.
-        metadata: of the UFL measure; None: the scene's quadrature."""
+
+        metadata: of the UFL measure; None: the scene's quadrature.
+        """
 
     @abstractmethod
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
         """Return the heights at which functions of the position are evaluated in a layer, shape (n,), length.
+
         For a solid they are Z. For a membrane, the mid-surface of all layers, they lie halfway between the layer's
-        faces."""
+        faces.
+        """
 
     @abstractmethod
     def _make_mesh(self) -> Any:

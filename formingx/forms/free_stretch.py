@@ -14,6 +14,7 @@ from .temperature_coefficient import TemperatureCoefficient
 
 class FreeStretch:
     """Stretch of the stress-free thermal expansion at the quadrature points of the energy.
+
     The deformation gradient is split into an elastic and an isotropic thermal part:
 
     .. math:: F = J_T^{1/3} F_e

@@ -22,18 +22,23 @@ class Start(Protocol):
 
 class History(Protocol):
     """Interface of the history variables of a material, a contact or the temperature.
+
     `start` sets the values of the reference configuration. `advance` updates them to the end of a step; `get` stores
     them before, and `put` restores them, or another accepted state. `save` makes data for a file, `load` takes them
     back, on any number of ranks; `transfer` moves them to a problem of the same body on another mesh. The result of
     `get` is never changed, and is valid on the same ranks only. Contacts are updated first, then materials, then the
-    temperature, which receives the heat that they dissipate."""
+    temperature, which receives the heat that they dissipate.
+    """
 
     def start(self) -> None:
         """Set the history variables to their values in the reference configuration."""
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the history variables to x, owned entries, shape (n,), at the end of a step; the forms must be set to
-        it. start: state at the beginning of the step; None for histories that do not depend on it."""
+        """Update the history variables to x, owned entries, shape (n,), at the end of a step.
+
+        The forms must be set to x. start: state at the beginning of the step; None for histories that do not depend on
+        it.
+        """
 
     def get(self) -> Any:
         """Return the current history variables, for `put`."""
@@ -49,18 +54,25 @@ class History(Protocol):
 
     def transfer(self, source: Any, variables: Any, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> Any:
-        """Return values for `put` on this mesh, from `variables` of the same history `source` on another mesh;
-        collective. The problem of `source` must be set to the state to transfer, the forms of this one to x, owned
-        entries, shape (n,). mapping: function from reference points there, shape (n, coordinates), to points here."""
+        """Return values for `put` on this mesh from the history `source` on another mesh; collective.
+
+        `source` has the same `variables`, and its problem must be set to the state to transfer, the forms of this one
+        to x, owned entries, shape (n,). mapping: function from reference points there, shape (n, coordinates), to
+        points here.
+        """
 
 
 @runtime_checkable
 class ConstitutiveHistory(History, Protocol):
     """Interface of the history variables of one material of the body.
-    rate_dependent: True if the stress depends on time, False if on past strains alone."""
+
+    rate_dependent: True if the stress depends on time, False if on past strains alone.
+    """
 
     rate_dependent: bool
 
     def forget_motion(self) -> None:
         """Reset the internal variables that describe the motion in the last step (`Material.motion_variables`).
-        The time integration of the next step then assumes no earlier motion."""
+
+        The time integration of the next step then assumes no earlier motion.
+        """

@@ -116,8 +116,10 @@ class LoadedBody:
         return form
 
     def work(self, load: Any, value: Any) -> Any:
-        """Return the virtual work of a load at a value (UFL, rank 1, user's units); if not linear in `du`, an
-        InputError."""
+        """Return the virtual work of a load at a value (UFL, rank 1, user's units).
+
+        If it is not linear in `du`, it is an InputError.
+        """
         form = load.virtual_work(self, value)
         if not isinstance(form, ufl.Form) or [v.number() for v in form.arguments()] != [0]:
             raise InputError(f"{load!r}: virtual_work must return a UFL form linear in body.du, such as"
@@ -126,12 +128,14 @@ class LoadedBody:
 
     def unit(self, load: Any) -> float:
         r"""Return the unit of a load, in the user's units: its value divided by its dimensionless amplitude.
+
         In the reference configuration, the nodal forces :math:`f_i` of a unit load add up to
 
         .. math:: \sum_i |f_i| = \frac{\mu V}{L}
 
         with the largest shear modulus mu (`stress`), the volume V and the largest extent L (`length`). Forces that
-        vanish or are not finite are an InputError."""
+        vanish or are not finite are an InputError.
+        """
         form = self._forms.compile(self.work(load, self.constant(1.0)))
         index_map = self._forms.space.dofmap.index_map
         forces = _compat.assemble_vector(la.vector(index_map, 1), form)

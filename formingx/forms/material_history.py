@@ -60,7 +60,9 @@ class MaterialHistory:
 
     def _values_at_end(self, cells: np.ndarray) -> dict[str, np.ndarray]:
         """Return the internal variables at the end of the step in some cells.
-        The result is {name: values, shape (cells, points, components)}."""
+
+        The result is {name: values, shape (cells, points, components)}.
+        """
         shape = len(cells), len(self._terms.places), sum(self._sizes.values())
         values = self._updated.eval(self._forms.domain, cells).reshape(shape) if len(cells) else np.zeros(shape)
         parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
@@ -91,7 +93,9 @@ class MaterialHistory:
 
     def save(self, variables: InternalVariables) -> dict[str, Any]:
         """Return "time", "cells" (numbers of the script, ascending) and "values" as data of all ranks; collective.
-        "values" is {name: array of shape (cells, points, components)}."""
+
+        "values" is {name: array of shape (cells, points, components)}.
+        """
         comm = self._forms.comm
         numbers = gathered(comm, self._numbers)
         order = np.argsort(numbers)
@@ -100,7 +104,9 @@ class MaterialHistory:
 
     def load(self, data: dict[str, Any]) -> InternalVariables:
         """Return the internal variables of this rank from data that `save` returned, such as those of a checkpoint.
-        Raise `InputError` if they belong to another mesh or another material."""
+
+        Raise `InputError` if they belong to another mesh or another material.
+        """
         numbers, values = np.array(data.get("cells", []), dtype=np.int64), data.get("values", {})
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = {name: np.array(v, dtype=float) for name, v in values.items()}
@@ -113,8 +119,10 @@ class MaterialHistory:
     def transfer(self, source: MaterialHistory, variables: InternalVariables, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
         """Interpolate the internal variables `variables` of `source`, on another mesh, to this mesh; collective.
+
         The forms of both problems must be set to the state. mapping: function from reference points of the other mesh,
-        shape (n, coordinates), to points of this mesh."""
+        shape (n, coordinates), to points of this mesh.
+        """
         interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
         shapes = self._terms.material.tensor_powers
         F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places)

@@ -72,7 +72,9 @@ class MaterialTerms:
 
     def position_coefficient(self, function: Any) -> fem.Function:
         """Return a quadrature `Function` of f(R, Z), of the reference position on the first mesh of a run, length.
-        In a membrane, Z is the height halfway through the layer."""
+
+        In a membrane, Z is the height halfway through the layer.
+        """
         found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.state_transfer
 
         def values(X: np.ndarray) -> np.ndarray:
@@ -85,7 +87,9 @@ class MaterialTerms:
 
     def temperature_coefficient(self, function: Any) -> Any:
         """Return f(T) (UFL scalar) at the quadrature points of the energy, at the end of a step.
-        A constant named in `Material.flow_constants` is evaluated in the middle of the step."""
+
+        A constant named in `Material.flow_constants` is evaluated in the middle of the step.
+        """
         forms, found = self.forms, self.quadrature_function()
         law = forms.mean_over_depths(getattr(function, "clamped", function), self)   # a user's may be any function
         coefficient = TemperatureCoefficient(forms, found, [(self.cells, law)], [forms.temperatures(self)])
@@ -100,7 +104,9 @@ class MaterialTerms:
 
     def mesh_coefficient(self, expression: Any) -> Any:
         """Return a UFL scalar on the scene's mesh as a coefficient.
-        Raise `InputError` if the fields live on another mesh, such as the mid-surface of a membrane."""
+
+        Raise `InputError` if the fields live on another mesh, such as the mid-surface of a membrane.
+        """
         if self.forms.domain is not self.forms.scene.mesh.domain:
             raise InputError(f"{self.material}: a membrane has its own mesh: give the constant as a function of"
                              f" (R, Z)")
@@ -122,7 +128,9 @@ class MaterialTerms:
 
     def unsymmetric_work(self, F: Any, derivative: Any) -> Any:
         """Return the virtual work of stresses without a potential, per reference volume (UFL, stress).
-        `derivative` gives the variation of a UFL expression. None if the tangent is symmetric."""
+
+        `derivative` gives the variation of a UFL expression. None if the tangent is symmetric.
+        """
         if self.material.symmetric:
             return None
         C = isochoric(F)
@@ -146,7 +154,9 @@ class MaterialTerms:
 
     def updated(self, F: Any) -> dict[str, Any]:
         """Return {name: internal variable (UFL)} at the end of the step; F: elastic, UFL, shape (3, 3).
-        Raise `InputError` if `Material.updated` returns other names or shapes than `Material.internal` has."""
+
+        Raise `InputError` if `Material.updated` returns other names or shapes than `Material.internal` has.
+        """
         found = self.material.updated(self.in_law_axes(F), self.internal, self._time_step, **self.constants)
         shapes = {name: ufl.as_ufl(value).ufl_shape for name, value in found.items()}
         requested = {name: np.shape(value) for name, value in self.material.internal.items()}

@@ -39,6 +39,7 @@ FIRST_STRETCH = 1e-6
 
 class MidSurface(Formulation):
     """Forms of a scene as a membrane; the only field is the displacement of the mid-surface.
+
     A sheet that is no graph over R, or a load or support not on a face or an end, is an InputError.
 
     Attributes:
@@ -55,7 +56,9 @@ class MidSurface(Formulation):
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
         """Return the normal away from a loaded whole face (UFL, shape (2,)), and the measure of the mid-surface.
-        Raise `InputError` if the boundary is not the whole lower or upper face."""
+
+        Raise `InputError` if the boundary is not the whole lower or upper face.
+        """
         nodes = self.scene.mesh.nodes_of(name)
         near = 1e-8 * self.length
         whole = len(nodes) and np.allclose([nodes[0, 0], nodes[-1, 0]], [self._R[0], self._R[-1]], rtol=0, atol=near)
@@ -68,7 +71,9 @@ class MidSurface(Formulation):
 
     def constraints(self, support: Any) -> list[Any]:
         """Return the constraints that a support at an end of the membrane imposes on the displacement.
-        A mean over an end becomes its single point. Raise `InputError` elsewhere."""
+
+        A mean over an end becomes its single point. Raise `InputError` elsewhere.
+        """
         items = [c if isinstance(c, Constrained) else Constrained(c.component, on=c.on) for c in support.constraints()]
         for item in items:
             if item.on is not None and item.on not in self.mesh.boundaries:
@@ -170,7 +175,9 @@ class MidSurface(Formulation):
 
     def _deformation_gradient(self) -> Any:
         """Return the deformation gradient diag(l1, 1/(l1 l2), l2) in principal axes: meridian, normal, hoop.
-        l1 and l2 are the principal stretches along the meridian and along the circumference."""
+
+        l1 and l2 are the principal stretches along the meridian and along the circumference.
+        """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)         # of the surface: its normal is kept
         t = F * ufl.as_vector([self._tangent[0], self._tangent[1], 0])
         l1, l2 = ufl.sqrt(ufl.inner(t, t)), F[2, 2]
@@ -185,7 +192,9 @@ class MidSurface(Formulation):
 
 def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
     """Return lowest and highest Z of a layer at ascending R, shape (n,) each; (inf, -inf) where the layer is absent.
-    near: distance along R below which positions count as equal, length."""
+
+    near: distance along R below which positions count as equal, length.
+    """
     cells = mesh.cells.find(mesh.layers[layer])
     nodes = cell_node_positions(mesh.domain, cells[cells < len(own_cells(mesh.domain))])
     edges = [(1, 2, 3), (0, 2, 4), (0, 1, 5)]                                  # ends, and the node between them

@@ -23,6 +23,7 @@ _SEARCH_PIECES = 8
 
 class Outline:
     """Boundary of a deformed solid: m edges of all ranks, each a parabola through its ends and its midpoint.
+
     The body lies to the left of each edge; the field `w` of the forms is examined.
 
     Attributes:
@@ -62,7 +63,9 @@ class Outline:
 
     def ordered(self, caller: str) -> list[int]:
         """Return the edge numbers in order around the body, counterclockwise.
-        Raise `InputError` with the name of the caller if the body has a hole or several parts."""
+
+        Raise `InputError` with the name of the caller if the body has a hole or several parts.
+        """
         after = {int(a): k for k, (a, _) in enumerate(self.ends)}
         order = [0]
         while len(order) < len(self.ends):
@@ -73,7 +76,9 @@ class Outline:
 
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
         """Divide curved edges (start, end, midpoint), shape (m, 3, 2), length, into straight pieces.
-        Return points, shape (n, 2), length, and the end numbers of each piece, shape (m parts, 2)."""
+
+        Return points, shape (n, 2), length, and the end numbers of each piece, shape (m parts, 2).
+        """
         m, corners = len(edges), int(self.ends.max()) + 1
         points = np.empty((corners + m * (parts - 1), edges.shape[-1]))
         points[self.ends] = edges[:, :2]
@@ -84,8 +89,10 @@ class Outline:
 
     def self_intersection(self, edges: np.ndarray) -> np.ndarray | None:
         """Return a point where deformed edges, shape (m, 3, 2), length, cross, shape (2,), length; else None.
+
         Crossings of edges with a common neighbour are ignored: an element that bends over a sharp edge makes a
-        crease."""
+        crease.
+        """
         if crossing_point(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
             return None
         points, pieces = self.pieces(edges, _SEARCH_PIECES)

@@ -71,7 +71,8 @@ class Probe:
         .. math:: \lambda = (1 + \text{row} \cdot x)^{\text{power}}
 
         The two points lie on the axis, the lower one first. Incompressibility gives the in-plane stretch from that of
-        the thickness: the power is -1/2 if axisymmetric, -1 in plane strain."""
+        the thickness: the power is -1/2 if axisymmetric, -1 in plane strain.
+        """
         (_, low), (_, high) = self.points
         row = self.row(np.array([[0.0, -1.0], [0.0, 1.0]])) * self._problem.forms.length / (high - low)
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
@@ -81,7 +82,8 @@ class Probe:
 
         .. math:: \text{row} \cdot x = \frac{1}{L} \sum_{i,c} w_{ic} u_{ic}
 
-        factors: weights w_ic of component c of point i, shape (n, components). L is `forms.length`."""
+        factors: weights w_ic of component c of point i, shape (n, components). L is `forms.length`.
+        """
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
@@ -90,8 +92,10 @@ class Probe:
 
     def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
         """Return the row of a weighted sum of displacements of points, locally owned entries.
+
         factors: of all n points, shape (n, components). point_weights: shape functions at the m points in cells of this
-        rank, shape (m, dim)."""
+        rank, shape (m, dim).
+        """
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
         triples: list[list] = [[], []]
@@ -112,8 +116,10 @@ class Probe:
 
 class MidSurfaceProbe(Probe):
     """Evaluation of the displacement of a membrane at fixed reference points through its thickness.
+
     Points off the mid-surface stay on the normal of their mid-surface point. Their distance from the mid-surface
-    changes in proportion to the thickness."""
+    changes in proportion to the thickness.
+    """
 
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)
@@ -136,8 +142,10 @@ class MidSurfaceProbe(Probe):
 
     def _average_slopes(self, element: Any, geometry: Any) -> None:
         """Replace `_tangent` by its mean over both elements at points where two elements meet; collective.
+
         `_ends` has data for the mean of du/dS there, by the reference arc length S. element, geometry: scalar elements
-        of a displacement component and of the mid-surface."""
+        of a displacement component and of the mid-surface.
+        """
         forms, domain = self._problem.forms, self._problem.forms.domain
         nodes = cell_node_positions(domain, own_cells(domain))
         R = forms.nearest(self.points)[:, 0]
@@ -154,7 +162,9 @@ class MidSurfaceProbe(Probe):
 
     def _mean_over_elements(self, values: np.ndarray) -> np.ndarray:
         """Return the mean of a vector over both elements at points where two elements meet, shape (n, 2); collective.
-        values: at the ends of elements, in the order of `_ends`, shape (ends, 2)."""
+
+        values: at the ends of elements, in the order of `_ends`, shape (ends, 2).
+        """
         total = np.zeros((len(self.points), self._components))
         np.add.at(total, self._ends[0], values / 2)
         return self._problem.comm.allreduce(total, MPI.SUM)
@@ -169,7 +179,9 @@ class MidSurfaceProbe(Probe):
 
     def row(self, factors: np.ndarray) -> np.ndarray:
         """Return the row of `Probe.row`, for weights of the displacement on the mid-surface, shape (n, components).
-        Raise `InputError` if a point is not on the mid-surface."""
+
+        Raise `InputError` if a point is not on the mid-surface.
+        """
         middle = self._problem.forms.nearest(self.points)
         outside = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
         if np.any(outside):
@@ -205,7 +217,9 @@ def _normal(tangents: np.ndarray) -> np.ndarray:
 
 def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
     """Return the dim shape functions of an element, or first derivatives on an interval, at m points, shape (m, dim).
-    reference: coordinates in the reference cell, shape (m, dimension of the cell)."""
+
+    reference: coordinates in the reference cell, shape (m, dimension of the cell).
+    """
     if not len(reference):                             # basix does not take an empty set
         return np.zeros((0, element.dim))
     return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)

@@ -49,7 +49,9 @@ class StepData:
     @cached_property
     def controlled(self) -> int | None:
         """Index in `rate` of the quantity that the control changes; None if nothing changes.
-        This is the process time if it changes, else the first item whose amplitude changes."""
+
+        This is the process time if it changes, else the first item whose amplitude changes.
+        """
         if self.rate[-1]:
             return len(self.rate) - 1
         return next((i for i, rate in enumerate(self.rate) if rate), None)
@@ -65,7 +67,9 @@ class StepData:
 
     def acting_amplitude(self, number: int, control: float) -> float:
         """Return the amplitude of a load that acts on the body, 0 if inactive.
-        With `fading`, a new load is multiplied by the control, a removed one by 1 - control."""
+
+        With `fading`, a new load is multiplied by the control, a removed one by 1 - control.
+        """
         share = float(number not in self.inactive)
         if self.fading and number in self.changed:
             share = control if share else 1 - control
@@ -77,7 +81,9 @@ class StepData:
 
     def transferred(self, before: Sequence[float], now: Sequence[float], control: float) -> tuple[StepData, float]:
         """Return step data and control that give the same values in the user's units on the next mesh of a run.
-        before, now: value of each item at amplitude 1 on both meshes, in the user's units, then 1 for the time."""
+
+        before, now: value of each item at amplitude 1 on both meshes, in the user's units, then 1 for the time.
+        """
         ratio = [b / n for b, n in zip(before, now, strict=True)]
         control_ratio = 1.0 if self.controlled is None else ratio[self.controlled]
         return replace(self, base=[r * b for r, b in zip(ratio, self.base, strict=True)],

@@ -83,8 +83,10 @@ class Solid(Formulation):
         return found
 
     def set_stiff(self) -> None:
-        """Set the fields `w` to 0, or in a very thin sheet to a small uniform strain, u = 1e-4 X. The bending stiffness
-        of such a sheet is below round-off; the stress of the strain stiffens it."""
+        """Set the fields `w` to 0, or in a very thin sheet to a small uniform strain, u = 1e-4 X.
+
+        The bending stiffness of such a sheet is below round-off; the stress of the strain stiffens it.
+        """
         super().set_stiff()
         if self.volume < _THIN_VOLUME * self.length**self.scene.kinematics.dimension_of_volume:
             space, dofs = self.space.sub(0).collapse()
@@ -142,14 +144,17 @@ class Solid(Formulation):
         .. math:: W(F) - \sigma_0 \ln J + p (J - 1)
 
         W is the strain energy, J the volume ratio without thermal expansion, p a pressure field, and :math:`\sigma_0`
-        the stress dW/dF11 at F = I. A penalty model has a penalty in place of :math:`p (J - 1)`."""
+        the stress dW/dF11 at F = I. A penalty model has a penalty in place of :math:`p (J - 1)`.
+        """
         return self.elastic_densities(names, self.elastic(F), ufl.split(self.w)[1:], density)
 
     def elastic_densities(self, names: list[str], F: Any, pressures: Any, density: Any = MaterialTerms.step_energy
                           ) -> list[tuple[Any, dict]]:
         """Return the terms of the energy density of layers of one material, for an elastic F (UFL, shape (3, 3)).
+
         Each is (energy per reference volume (UFL, stress), quadrature metadata): the strain energy, and the pressure
-        field or penalty of incompressibility. pressures: all fields, numbered as in `pressure_of`."""
+        field or penalty of incompressibility. pressures: all fields, numbered as in `pressure_of`.
+        """
         model, terms, J = self.scene.model, self._terms[names[0]], kin.volume_ratio(F) / self.ratio_before
         W = density(terms, F)
         if model.stress_free:

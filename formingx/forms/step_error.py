@@ -45,10 +45,12 @@ class StepError:
 
     def estimate(self, past: Sequence[Any], share: np.ndarray, x: np.ndarray, control: float) -> tuple[float, float]:
         """Estimate the relative error of a step from the last of `past` to x, shape (n,), by step doubling.
+
         share: weights of `past` and x for the displacement halfway in time, shape (k + 1,). Return the error of the
         stress, and its part left after relaxation for another such time, which adds up over steps. Both are root mean
         squares over the body, over the largest stress at the start, at the end and after relaxation; times 4 for
-        materials whose errors have one sign (`Material.motion_variables`, integral laws)."""
+        materials whose errors have one sign (`Material.motion_variables`, integral laws).
+        """
         forms, old = self._forms, past[-1]
         start, clock, end = [h.get() for h in forms.histories], forms.clock, forms.time_at(control)
         step = end - old.time if self._stresses else 0.0
@@ -85,7 +87,9 @@ class StepError:
 
     def _stresses_at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
         """Return the stresses of each material at the end of a step, shape (points, 4); x: shape (n,).
-        Entries 11, 22, sqrt(2) 12, 33 of the deviatoric Kirchhoff stress."""
+
+        Entries 11, 22, sqrt(2) 12, 33 of the deviatoric Kirchhoff stress.
+        """
         self._set_time(time)
         self._problem.set_fields(x)
         return [stress.values() for stress in self._stresses]
@@ -98,7 +102,9 @@ class StepError:
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:
         """Update the history variables of the materials to the unknowns x at a process time.
-        x: locally owned entries, shape (n,). control: load parameter (control) at this time, dimensionless."""
+
+        x: locally owned entries, shape (n,). control: load parameter (control) at this time, dimensionless.
+        """
         self._problem.set_fields(x)
         self._set_time(time)
         for history in self._materials:
@@ -106,7 +112,9 @@ class StepError:
 
     def _norm(self, values: list[np.ndarray]) -> float:
         """Return the root mean square of stresses over all quadrature points of all ranks.
-        values: stresses of each material, shape (points, 4)."""
+
+        values: stresses of each material, shape (points, 4).
+        """
         comm = self._problem.comm
         total, number = (combined(comm, v, MPI.SUM)
                          for v in (float(sum(np.sum(v**2) for v in values)), sum(v.shape[0] for v in values)))
@@ -118,7 +126,8 @@ class _Stress:
 
     .. math:: \tau = \mathrm{dev} \left( \frac{\partial W}{\partial F} F^T \right)
 
-    W is an energy of the material per reference volume, and F the deformation gradient without thermal expansion."""
+    W is an energy of the material per reference volume, and F the deformation gradient without thermal expansion.
+    """
 
     def __init__(self, forms: Any, terms: Any, energy: Callable):
         F = ufl.variable(forms.elastic_F)

@@ -17,8 +17,10 @@ from .constraints import Constraints
 
 class ExtendedMatrix:
     """Sparse matrix `mat` of a tangent K and m constraint rows C, allocated once and refilled for every tangent.
+
     form, index_map: compiled bilinear form of K, and that of its space. rows: C, locally owned entries, shape (n,)
-    each; later rows must be 0 where these are 0. bcs: later calls of `constrain` may constrain a subset of them."""
+    each; later rows must be 0 where these are 0. bcs: later calls of `constrain` may constrain a subset of them.
+    """
 
     def __init__(self, form: Any, index_map: Any, bcs: list, rows: list[np.ndarray], comm: Any, symmetric: bool):
         self._form, self._index_map, self._comm = form, index_map, comm
@@ -39,7 +41,9 @@ class ExtendedMatrix:
 
     def constrain(self, bcs: list, rows: list[np.ndarray]) -> None:
         """Set DirichletBCs and rows of the constraint matrix C, owned entries, shape (n,) each, of later tangents.
-        Constrained unknowns, and the multipliers of rows that are 0 on all ranks, get unit vectors."""
+
+        Constrained unknowns, and the multipliers of rows that are 0 on all ranks, get unit vectors.
+        """
         self._bcs, size, offset = bcs, self._index_map.size_local, self._index_map.local_range[0]
         self._constrained = np.zeros(size + self._index_map.num_ghosts, dtype=bool)
         for bc in bcs:
@@ -53,7 +57,9 @@ class ExtendedMatrix:
 
     def fill(self, blocks: Sequence[tuple[np.ndarray, np.ndarray]] = ()) -> PETSc.Mat:
         """Assemble and return the matrix, with blocks (dofs, shape (n, m), with ghosts; values, shape (n, m, m)) added.
-        The m unknowns of a block must share a cell. Entries of constrained unknowns are skipped."""
+
+        The m unknowns of a block must share a cell. Entries of constrained unknowns are skipped.
+        """
         A, add = self.mat, PETSc.InsertMode.ADD_VALUES
         A.zeroEntries()
         _compat.assemble_matrix(A, self._form, self._bcs)
@@ -73,7 +79,9 @@ class ExtendedMatrix:
 
     def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
         """Return the sparsity pattern: row pointers and global column numbers of all locally owned rows.
-        rows: rows of the constraint matrix C, locally owned entries, shape (n,) each. m: their number."""
+
+        rows: rows of the constraint matrix C, locally owned entries, shape (n,) each. m: their number.
+        """
         plain = fem_petsc.create_matrix(self._form)
         _compat.assemble_matrix(plain, self._form, self._bcs)
         plain.assemble()
@@ -99,7 +107,9 @@ class ExtendedMatrix:
 
 class Tangent:
     """Derivatives of the residual F by the unknowns and the control, with the constraints of supports.
-    `matrix`, an `ExtendedMatrix`, holds dF/dx, which may be `symmetric`; `by_control` returns dF/dcontrol."""
+
+    `matrix`, an `ExtendedMatrix`, holds dF/dx, which may be `symmetric`; `by_control` returns dF/dcontrol.
+    """
 
     def __init__(self, forms: Any, constraints: Constraints, symmetric: bool):
         scene = forms.scene
@@ -116,7 +126,9 @@ class Tangent:
 
     def enter(self, active: Any, rate: list[float], changed: bool) -> None:
         """Set the active constraints, and the motion of driven supports, for new step data.
-        rate: `StepData.rate`. changed: True if the constraints differ from the current ones."""
+
+        rate: `StepData.rate`. changed: True if the constraints differ from the current ones.
+        """
         if changed:
             self.matrix.constrain(active.bcs, active.rows)
         if self._lift is not None:
@@ -125,7 +137,9 @@ class Tangent:
 
     def by_control(self, rate: list[float], assemble: Callable[[Any], np.ndarray], n: int) -> np.ndarray:
         """Return dF/dcontrol, shape (n,), through loads, time and driven supports, by rates `StepData.rate`.
-        `assemble` maps a compiled linear form to its n locally owned entries."""
+
+        `assemble` maps a compiled linear form to its n locally owned entries.
+        """
         values = assemble(self._by_load) if self._by_load else np.zeros(n)
         if self._by_time and rate[-1]:
             values += assemble(self._by_time)

@@ -12,6 +12,7 @@ from dolfinx import fem
 
 class TemperatureCoefficient:
     r"""Coefficient f(T) at the quadrature points of the energy, for temperatures that may change with time.
+
     The temperature is known at the beginning :math:`t_0` of a step. Within the step the coefficient is extrapolated
     with its logarithmic rate in the previous step:
 
@@ -37,7 +38,9 @@ class TemperatureCoefficient:
 
     def update(self, temperatures: Iterable[np.ndarray]) -> None:
         """Update the coefficient to changed temperatures at quadrature points, else raise `InputError`.
-        temperatures: for each of `parts`, now and before, shape (1 or 2, cells, q)."""
+
+        temperatures: for each of `parts`, now and before, shape (1 or 2, cells, q).
+        """
         given = list(temperatures)
         key = self._temperature.time, self._temperature.time_before, *(T.tobytes() for T in given)
         known = self._known.pop(key, None)
@@ -59,8 +62,10 @@ class TemperatureCoefficient:
 
     def _evaluate(self, temperatures: Sequence[np.ndarray]) -> None:
         """Set the coefficient f and its logarithmic rate a, in time, from temperatures.
+
         temperatures: for each group of cells, shape (1 or 2, cells, q): at the last accepted state, then at the state
-        before. With one of them the rate is 0."""
+        before. With one of them the rate is 0.
+        """
         temperature = self._temperature
         for (cells, function), T in zip(self._parts, temperatures, strict=True):
             rows = self._values.function_space.dofmap.list[cells]

@@ -19,6 +19,7 @@ _FITTED_POINTS = 12
 
 class MovingLeastSquares:
     r"""Interpolating moving least squares from source points, shape (m, c), to target points, shape (n, c), length.
+
     A quadratic polynomial p is fitted around each target point y to the k nearest values :math:`f_i` at :math:`x_i`
     (Lancaster and Salkauskas, Mathematics of Computation 37, 1981):
 
@@ -58,7 +59,9 @@ class MovingLeastSquares:
 
 def restrict_fields(source: Any, state: Any, problem: Any) -> None:
     """Set the fields of a problem on part of a mesh from a state on the whole mesh; collective.
-    The transfer is exact, cell by cell: displacements are quadratic with a bubble, pressures linear."""
+
+    The transfer is exact, cell by cell: displacements are quadratic with a bubble, pressures linear.
+    """
     whole, part = source.forms, problem.forms
     domain = whole.domain
     with source.state_context(state):
@@ -97,7 +100,9 @@ def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
 
 def _shapes(barycentric: np.ndarray) -> np.ndarray:
     """Return the seven shape functions of a quadratic triangle with a bubble, shape (..., 7).
-    They belong to corners, opposite midpoints and centroid; barycentric: shape (..., 3)."""
+
+    They belong to corners, opposite midpoints and centroid; barycentric: shape (..., 3).
+    """
     a, b, c = np.moveaxis(barycentric, -1, 0)
     bubble = 27 * a * b * c
     corners = [s * (2 * s - 1) + bubble / 9 for s in (a, b, c)]
@@ -113,8 +118,10 @@ def _key(corners: np.ndarray) -> frozenset[tuple[float, float]]:
 def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, control: float,
                        moved: bool = False) -> None:
     """Set the history variables of a problem from a state on another mesh of the body; collective.
+
     x: unknowns on the mesh of `problem`, shape (n,). Those of contact are left out if the numbers of histories differ,
-    or if `moved` is True: the mesh is one of the deformed body."""
+    or if `moved` is True: the mesh is one of the deformed body.
+    """
     problem.set_fields(x, control)
     with source.state_context(state):
         def on_this_mesh(points: np.ndarray) -> np.ndarray:
@@ -130,11 +137,13 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
 def fitted_tensors(interpolation: MovingLeastSquares, values: np.ndarray, source_F: np.ndarray,
                    target_F: np.ndarray) -> np.ndarray:
     r"""Interpolate symmetric positive definite tensors C, entries 11, 22, 12, 33, to other points; collective.
+
     The interpolated quantity is the logarithm relative to the current configuration, so stresses stay continuous:
 
     .. math:: \ln(F^{-T} C F^{-1})
 
-    values: shape (m, 4); source_F, target_F: shape (m, 3, 3) and (n, 3, 3). The result has the shape (n, 4)."""
+    values: shape (m, 4); source_F, target_F: shape (m, 3, 3) and (n, 3, 3). The result has the shape (n, 4).
+    """
     seen = np.linalg.solve(np.swapaxes(source_F, 1, 2), _matrices(values))
     w, v = np.linalg.eigh(np.swapaxes(np.linalg.solve(np.swapaxes(source_F, 1, 2), np.swapaxes(seen, 1, 2)), 1, 2))
     w, v = np.linalg.eigh(interpolation.fitted(np.einsum("nij,nj,nkj->nik", v, np.log(w), v)))
@@ -152,7 +161,9 @@ def _matrices(entries: np.ndarray) -> np.ndarray:
 
 def isochoric_gradients(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return F without thermal expansion, scaled to det F = 1, shape (cells q, 3, 3); collective.
-    places: positions in the reference cell, shape (q, dimension)."""
+
+    places: positions in the reference cell, shape (q, dimension).
+    """
     F = forms.elastic_F
     expression = _compat.compile_expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places)
     found = (expression.eval(forms.domain, cells) if len(cells) else np.zeros(0)).reshape(-1, 3, 3)

@@ -13,12 +13,14 @@ from .. import _compat
 
 class Viscosity:
     r"""Nodal forces of a viscous stress on the whole body, eta V dx for a change dx of the unknowns.
+
     The matrix V belongs to a viscosity of 1, and the methods receive the viscosity eta (dimensionless):
 
     .. math:: w^T V \, dx = \frac{1}{V_0} \int dF : \delta F \, dV_0
 
     dF and :math:`\delta F` are the deformation gradients of dx and of virtual unknowns w, V_0 is the reference volume.
-    Constrained unknowns neither cause nor receive forces."""
+    Constrained unknowns neither cause nor receive forces.
+    """
 
     def __init__(self, form: Any, bcs: list):
         self._matrix = fem_petsc.create_matrix(form)

@@ -36,8 +36,10 @@ class CsvTable(NamedTuple):
 
     def take(self, column: str, requested: float | str | None = None) -> np.ndarray:
         """Return the values of a column, shape (n,), converted to a unit or multiplied by a factor.
+
         None keeps the values of a column without unit. A missing column, a cell that is no finite number, or a wrong
-        unit is an InputError."""
+        unit is an InputError.
+        """
         check_name(f"{self.name}: column", column, self.columns)
         values, unit = self.columns[column], self.units[column]
         if not np.all(np.isfinite(values)):
@@ -58,7 +60,9 @@ class CsvTable(NamedTuple):
 
 def conversion(unit: str, requested: str) -> float:
     """Return the factor that converts numbers from one unit to another, for example 10 from "cm" to "mm".
-    An unknown unit, or units of different quantities, are an InputError."""
+
+    An unknown unit, or units of different quantities, are an InputError.
+    """
     if unit == requested:
         return 1.0
     for sizes in UNITS.values():
@@ -73,8 +77,10 @@ def conversion(unit: str, requested: str) -> float:
 
 def read(file: Any) -> CsvTable:
     """Return the table in a CSV file with its units; columns without any number are left out.
+
     The first row names the columns, with units as in "pressure [psi]". A file without, with a name twice, fewer than
-    two rows, or a ragged row is an InputError."""
+    two rows, or a ragged row is an InputError.
+    """
     name = os.fspath(file_path("table", file))
     cells = records(name)
     if not cells:
@@ -98,8 +104,10 @@ def read(file: Any) -> CsvTable:
 
 def records(file: Any) -> list[tuple[int, list[str]]]:
     """Return (line number, cells as text) of each row of a CSV file, with points for decimal commas.
+
     Cells are separated by semicolons or tabs, if the first line or half of the lines contain one, else by commas. Empty
-    lines and those from # are skipped. Unreadable files, quotes or mixed decimals are an InputError."""
+    lines and those from # are skipped. Unreadable files, quotes or mixed decimals are an InputError.
+    """
     name = os.fspath(file)
     try:
         with open(name, "rb") as stream:
@@ -134,7 +142,9 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
 
 def _decoded(content: bytes) -> str:
     """Return the bytes of a file as text: UTF-16 with its mark or with many zero bytes, UTF-8, or else Windows-1252.
-    Other bytes raise a UnicodeDecodeError."""
+
+    Other bytes raise a UnicodeDecodeError.
+    """
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16")
     if content[1:400:2].count(0) > len(content[1:400:2]) / 2:
@@ -147,7 +157,9 @@ def _decoded(content: bytes) -> str:
 
 def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
     """Return pairs (line number, line) of the lines of a file, without empty lines and comments.
-    A comment is a line that begins with #. Between a quote and its end, all lines are kept."""
+
+    A comment is a line that begins with #. Between a quote and its end, all lines are kept.
+    """
     found, quoted = [], False
     for n, line in enumerate(lines, 1):
         if quoted or line.strip() and not line.lstrip().startswith("#"):
@@ -158,7 +170,9 @@ def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
 
 def from_arrays(name: str, columns: Mapping[str, Any]) -> CsvTable:
     """Return a table of {column: values, shape (n,)}, n at least 2, without units; `name` is for messages.
-    Values that are no numbers, or of other lengths, are an InputError."""
+
+    Values that are no numbers, or of other lengths, are an InputError.
+    """
     arrays = {}
     for key, values in columns.items():
         try:

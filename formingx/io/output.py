@@ -14,8 +14,10 @@ from ..errors import file_path
 
 def replace(file: Any, write: Callable[[Any], Any], mode: str = "w") -> None:
     """Write a file under a temporary name, then rename it, so that no other program reads an incomplete file.
+
     `write` writes to a stream, "w" for text or "wb" for bytes. If it fails, the earlier file is kept, and an OSError
-    names the file. Mode and owner are kept, links followed, devices written directly."""
+    names the file. Mode and owner are kept, links followed, devices written directly.
+    """
     file = file_path("file", file)
     target = Path(os.path.realpath(file))
     temporary = target.with_name(f"{target.name}.{os.getpid()}.part")

@@ -15,14 +15,17 @@ def volume(points: np.ndarray, triangles: np.ndarray) -> float:
     .. math:: V = \frac{1}{6} \sum a \cdot (b \times c)
 
     The corners have shape (n, 3), length, the triangles (m, 3). Clockwise ones, seen from outside, give a negative
-    volume."""
+    volume.
+    """
     a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
     return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 
 
 def write_stl(points: np.ndarray, triangles: np.ndarray, file: Any) -> None:
     """Write points (n, 3), length, and triangles (m, 3), counter-clockwise seen from outside, as binary STL.
-    A failed file is an OSError."""
+
+    A failed file is an OSError.
+    """
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

@@ -33,7 +33,8 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
     branch. The flow law of the material is f, for example :math:`f_i = e^{2 w_i} - \tfrac{1}{3} \sum_j e^{2 w_j}`.
     Branches have relaxation times (branches,), and f maps w to f(w), both (branches, 3). Times and stretches have shape
     (n,); two stretches at one time are a jump, and `between` has a constant rate, "stretch" or "strain". The result has
-    shape (n, branches, 3); a ConvergenceError says where the integration stopped."""
+    shape (n, branches, 3); a ConvergenceError says where the integration stopped.
+    """
     from scipy.integrate import solve_ivp
     check_name("elastic_strains: mode", mode, MODES)
     direction = np.array([1, MODES[mode], -1 - MODES[mode]])
@@ -62,8 +63,10 @@ def elastic_strains(flow: Callable, tau: Any, mode: str, times: np.ndarray, stre
 
 def checked(name: str, mode: Any, times: Any, stretches: Any, between: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return times and stretches of a homogeneous test as arrays, shape (n,) each, checked.
+
     An unknown mode or `between` ("stretch" or "strain"), other shapes, descending times or stretches that are not
-    positive are an InputError."""
+    positive are an InputError.
+    """
     check_name(f"{name}: mode", mode, MODES)
     check_name(f"{name}: between", between, BETWEEN)
     try:

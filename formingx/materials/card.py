@@ -24,8 +24,10 @@ _STRETCH_FRACTION = 0.97
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
           unit_of_time: str) -> Path:
     """Write an HTML page with stress-stretch curves and the limits of a material, and return its path.
+
     Curves are drawn at temperatures and Hencky rates, 1/time, with units in labels. Missing temperatures of a dependent
-    constant are an InputError."""
+    constant are an InputError.
+    """
     caller, path = f"{material}: report", file_path("report: file", file)
     depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
     values = as_list(f"{caller}: temperatures", temperatures, "temperatures")
@@ -52,8 +54,10 @@ def _shift(material: Any, temperature: float) -> float:
 
 def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
     """Return rows (quantity, value) of a table for a material at one temperature: moduli and limits of stretch.
+
     `name` is the temperature as text, or "". `shift` is the factor of the relaxation times at this temperature. `unit`
-    and `unit_of_time` are the units of stress and time."""
+    and `unit_of_time` are the units of stress and time.
+    """
     def with_unit(value: float, symbol: str = "") -> str:
         return f"{value:.4g} {symbol}".rstrip()
     rows = [("temperature", name)] if name else []
@@ -81,8 +85,10 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
 
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
     """Return a PNG image, base64-encoded, with true stress over stretch in three tests.
+
     Cases are (temperature as text, material, factor of relaxation times); rates are Hencky rates, 1/time, none without
-    relaxation."""
+    relaxation.
+    """
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):
         for k, (name, material, shift) in enumerate(cases):

@@ -81,7 +81,9 @@ class Varying(ABC):
 
 class OfPosition(Varying):
     """Material constant that is a function f(R, Z) of the reference position.
-    The function takes two arrays, shape (n,), length, and returns the constant, shape (n,)."""
+
+    The function takes two arrays, shape (n,), length, and returns the constant, shape (n,).
+    """
 
     def __init__(self, function: Callable):
         self.function = function
@@ -195,7 +197,9 @@ class OfMesh(Varying):
 
 def varying(value: Any) -> Varying | None:
     """Return a constant as an object of `Varying`; None for a number.
-    It may be a function f(R, Z), a UFL expression, or a `table` over the temperature."""
+
+    It may be a function f(R, Z), a UFL expression, or a `table` over the temperature.
+    """
     if isinstance(value, Varying):
         return value
     if isinstance(value, ufl.core.expr.Expr):

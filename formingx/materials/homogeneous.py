@@ -115,7 +115,8 @@ def in_plane_stretches(mode: str, stretches: Any) -> np.ndarray:
     .. math:: l_1 = l, \qquad l_2 = l^k
 
     Stretches l have shape (n,), and k is -1/2 ("uniaxial"), 0 ("pure_shear") or 1 ("equibiaxial"); the result has shape
-    (2, n)."""
+    (2, n).
+    """
     l = np.asarray(stretches, float)
     return np.stack([l, l ** MODES[mode]])
 
@@ -168,13 +169,16 @@ class MaterialStability(NamedTuple):
 
 def stability(response: Response, constants: Any, low: float, high: float) -> MaterialStability:
     """Return the ranges of stretch around 1 in which a material is stable in three homogeneous tests.
+
     The criteria are a finite stress, an increasing force and Drucker's. Ends are searched for at 400 stretches of equal
-    ratio from `low` to `high`, then by bisection. Constants have the order of `response`."""
+    ratio from `low` to `high`, then by bisection. Constants have the order of `response`.
+    """
     constants = list(constants)
 
     @np.errstate(all="ignore")
     def margins(mode: str, l: np.ndarray) -> np.ndarray:
         """Return the margins of three criteria, positive where they hold, at stretches l of a test, shape (3, n).
+
         The first is 1 where the stress is finite, else not a number. The second is l^2 dP/dl, the third the smaller
         eigenvalue of the Hessian of W in the logarithmic strains. Both are divided by the size of Hessian and stress.
         """
@@ -204,7 +208,9 @@ def stability(response: Response, constants: Any, low: float, high: float) -> Ma
 
 class _Program:
     """Scalar UFL expressions as a list of numpy operations, with common parts evaluated once.
-    The inputs are three stretches, then the constants of an energy."""
+
+    The inputs are three stretches, then the constants of an energy.
+    """
 
     def __init__(self, inputs: list, outputs: list):
         place: dict[Any, int] = {c: i for i, c in enumerate(inputs)}
@@ -232,7 +238,9 @@ class _Program:
 @functools.lru_cache
 def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
     """Return programs of the first, and of the first and second derivatives of W by principal stretches.
-    They have 3 and 9 outputs (11, 12, 13, 22, 23, 33 last). W depends on `_STRETCHES` and n `_CONSTANTS`."""
+
+    They have 3 and 9 outputs (11, 12, 13, 22, 23, 33 last). W depends on `_STRETCHES` and n `_CONSTANTS`.
+    """
     inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
     W = expand_indices(expand_derivatives(W))
     first = [expand_derivatives(ufl.diff(W, x)) for x in _STRETCHES]

@@ -28,8 +28,10 @@ class Peak(NamedTuple):
 
 class FreeInflation:
     """Free inflation of a thin tube or disc of incompressible layers.
+
     Layers are (material, reference thickness in units of length) with constants that are numbers; the radius is the
-    mean of the tube or that of the opening, length."""
+    mean of the tube or that of the opening, length.
+    """
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):
         self._layers = [(material, list(material.parameters.values()), h) for material, h in layers]
@@ -37,6 +39,7 @@ class FreeInflation:
 
     def tube(self, hoop: np.ndarray) -> np.ndarray:
         r"""Return the pressure in a long tube with closed ends that is free to extend.
+
         The axial Cauchy stress is half of the hoop stress. This condition gives the axial stretch
         :math:`\lambda_z` at a hoop stretch :math:`\lambda_h`:
 
@@ -44,7 +47,8 @@ class FreeInflation:
 
         P are nominal stresses, h0 is the reference thickness and R the reference radius. For several layers P h0 is a
         sum over the layers. Hoop stretches have shape (n,); pressures beyond the largest stretch of a material are
-        infinite."""
+        infinite.
+        """
         low, high = np.full_like(hoop, 0.5), hoop + 1.0
         for _ in range(_HALVINGS):
             axial = (low + high) / 2
@@ -56,6 +60,7 @@ class FreeInflation:
 
     def disc(self, stretch: np.ndarray) -> np.ndarray:
         r"""Return the pressure on a disc that is blown to a spherical cap with a uniform equibiaxial stretch l.
+
         Let a be the radius of the opening and s a the height of the cap. With the nominal stress P and the reference
         thickness h0
 
@@ -63,7 +68,8 @@ class FreeInflation:
 
         For several layers P h0 is a sum over the layers. The maximum of the pressure is 2 to 3 % below the maximum for
         a hinged neo-Hookean disc. Stretches l have shape (n,), 1 or larger; pressures beyond the largest stretch of a
-        material are infinite."""
+        material are infinite.
+        """
         force = self._forces(in_plane_stretches("equibiaxial", stretch))[0]
         found = 4 * np.sqrt(stretch**2 - 1) * force / (self._radius * stretch**3)
         return np.where(np.isfinite(found), found, np.inf)

@@ -16,9 +16,13 @@ class IntegralLaw(Protocol):
 
     def history(self, forms: object, terms: object) -> object:
         """Return the history of past states, a `formingx.forms.history.ConstitutiveHistory`, for a body and a material.
-        forms, terms: its `Formulation` and `MaterialTerms`. `refresh()` updates the fields `coefficients` to them."""
+
+        forms, terms: its `Formulation` and `MaterialTerms`. `refresh()` updates the fields `coefficients` to them.
+        """
 
     def unsymmetric_work(self, C: Sequence[object], dC: Sequence[object], coefficients: Mapping[str, object]) -> object:
         """Return the virtual work (UFL, stress) per reference volume that derives from no potential, or None.
+
         C, dC: entries 11, 22, 12, 33 of the isochoric right Cauchy-Green tensor and its virtual change (UFL).
-        coefficients: {name: function (UFL)}."""
+        coefficients: {name: function (UFL)}.
+        """

@@ -131,7 +131,9 @@ class Material(Energies):
 
     def _moduli(self, constants: Any, n: int) -> np.ndarray:
         """Return the smallest and largest small-strain shear modulus for n sets of constants, (2, n), stress.
-        They hold for strains along the axes of the section; `constants` follow `parameters`, numbers or shape (n,)."""
+
+        They hold for strains along the axes of the section; `constants` follow `parameters`, numbers or shape (n,).
+        """
         H = self.response.logarithmic(np.ones((2, n)), constants)[1] / 2
         a, b = (H[0, 0] - 2 * H[0, 1] + H[1, 1]) / 2, (H[0, 0] + 2 * H[0, 1] + H[1, 1]) / 6
         half = np.hypot((a - b) / 2, (H[0, 0] - H[1, 1]) / math.sqrt(12))

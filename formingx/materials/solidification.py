@@ -197,8 +197,10 @@ class Solidification(Material):
 
     def _begin(self, internal: dict[str, Any], constants: dict[str, Any]) -> tuple[Any, Any, Any]:
         """Return A and the solidified fraction phi at the beginning of a step, and phi at its end (UFL).
+
         A, entries (11, 22, 12, 33), is the integral of C^-1 over the solidified fraction, that of the previous step
-        included."""
+        included.
+        """
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)
                       for phi in (2 * ufl.ln(constants["set_middle"]) - end, end))
@@ -238,7 +240,9 @@ class _Fraction:
 
 def _fraction(between: Any, fraction: Any) -> _Fraction:
     """Return the solidified fraction phi(T), from two temperatures or a `table`.
-    Between the two, the lower first, phi decreases from 1 to 0. None, both or a wrong argument is an InputError."""
+
+    Between the two, the lower first, phi decreases from 1 to 0. None, both or a wrong argument is an InputError.
+    """
     if (between is None) == (fraction is None):
         raise InputError(f"Solidification: between = {between!r}, fraction = {fraction!r}: give one of them: the"
                          f" temperatures between=(75, 85) at which all and nothing has solidified, or a table of the"

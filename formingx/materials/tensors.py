@@ -13,7 +13,8 @@ def isochoric(F: Any) -> Entries:
 
     .. math:: \bar C = J^{-2/3} F^T F
 
-    F (UFL) has shape (3, 3); the result has the entries (11, 22, 12, 33), with the axis of 33 normal to the others."""
+    F (UFL) has shape (3, 3); the result has the entries (11, 22, 12, 33), with the axis of 33 normal to the others.
+    """
     F = kinematics.in_section_order(F)
     C, scale = F.T * F, kinematics.volume_ratio(F) ** (-2 / 3)
     return scale * C[0, 0], scale * C[1, 1], scale * C[0, 1], scale * C[2, 2]
@@ -34,7 +35,8 @@ def inner(A: Entries, B: Entries) -> Any:
 
     .. math:: A : B = \mathrm{tr}(A B) = A_{11} B_{11} + A_{22} B_{22} + 2 A_{12} B_{12} + A_{33} B_{33}
 
-    Both have the entries (11, 22, 12, 33)."""
+    Both have the entries (11, 22, 12, 33).
+    """
     return A[0] * B[0] + A[1] * B[1] + 2 * A[2] * B[2] + A[3] * B[3]
 
 
@@ -43,7 +45,8 @@ def determinant(A: Entries) -> Any:
 
     .. math:: \det A = A_{33} (A_{11} A_{22} - A_{12}^2)
 
-    The tensor has the entries (11, 22, 12, 33)."""
+    The tensor has the entries (11, 22, 12, 33).
+    """
     return A[3] * (A[0] * A[1] - A[2] ** 2)
 
 
@@ -52,7 +55,8 @@ def cofactor(A: Entries) -> Entries:
 
     .. math:: \mathrm{cof} \, A = \det(A) \, A^{-1}
 
-    Both have the entries (11, 22, 12, 33)."""
+    Both have the entries (11, 22, 12, 33).
+    """
     return A[1] * A[3], A[0] * A[3], -A[2] * A[3], A[0] * A[1] - A[2] ** 2
 
 
@@ -61,7 +65,8 @@ def deviator_squared(C: Entries, B: Entries) -> Any:
 
     .. math:: |\mathrm{dev}(F B F^T)|^2 = \mathrm{tr}\,(C B)^2 - \tfrac{1}{3} (\mathrm{tr}\, C B)^2
 
-    Both have the entries (11, 22, 12, 33)."""
+    Both have the entries (11, 22, 12, 33).
+    """
     t = C[0] * B[0] + C[1] * B[1] + 2 * C[2] * B[2]
     d = (C[0] * C[1] - C[2] ** 2) * (B[0] * B[1] - B[2] ** 2)
     third = C[3] * B[3]

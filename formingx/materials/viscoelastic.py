@@ -86,6 +86,7 @@ class Viscoelastic(GeneralisedMaxwell):
 
     def _step_start(self, past, Cv, x):
         r"""Return the tensor G, entries (11, 22, 12, 33), and the factor x' of the closed form of a step.
+
         At the end of the step the internal variable is G + x' C, scaled to the determinant 1. C is the isochoric right
         Cauchy-Green tensor there.
 
@@ -93,7 +94,8 @@ class Viscoelastic(GeneralisedMaxwell):
                   x' = \frac{x}{2} \left[1 + \frac{x}{3} \mathrm{tr}(C_n C_{v,n}^{-1})\right]
 
         A step of first order has G = Cv_n and x' = x. C_n is `past`, None for a step of first order, Cv_n is `Cv`, and
-        x is the step over the relaxation time."""
+        x is the step over the relaxation time.
+        """
         if past is None:
             return Cv, x
         return plus(Cv, past, x / 2), x / 2 * (1 + x / 3 * inner(past, cofactor(Cv)))
@@ -153,7 +155,8 @@ class TransientNetwork(GeneralisedMaxwell):
         step. The length of the step over the length of the previous one is s; it is 0 if the previous step is unknown.
         The factor s/(1 + s) is multiplied by 2 - s/2 for s from 2 to 4, and is 0 for larger s, because BDF2 would be
         unstable. It is also 0 where the tensor M of the step (`_past_tensor`) would not be positive definite.
-        `internal` has {name: internal variable at the beginning of the step (UFL, shape () or (4,))}."""
+        `internal` has {name: internal variable at the beginning of the step (UFL, shape () or (4,))}.
+        """
         s, change = time_step * internal["pace"], entries(internal["change"])
         near = ufl.max_value(0, ufl.min_value(1, 2 - s / 2))        # steps that grow faster make BDF2 unstable
         small = ufl.lt(-inner(entries(internal["C"]), change), 1)       # else M is not positive definite
@@ -182,13 +185,15 @@ class TransientNetwork(GeneralisedMaxwell):
 
     def _past_tensor(self, past, A, x):
         r"""Return the tensor M in the potential mu/2 [tr(C M) - 3] of a branch in a step, entries (11, 22, 12, 33).
+
         Here mu is the shear modulus of the branch, and C the isochoric right Cauchy-Green tensor at the end of the
         step. Its value at the beginning is C_n, at the beginning of the previous step C_n-1:
 
         .. math:: M = e^{-x} A_n + (m - e^{-x} + p) C_n^{-1} + p s (C_n^{-1} - C_{n-1}^{-1}), \qquad
                   m = \frac{1 - e^{-x}}{x}, \qquad p = \frac{x - 2 + (x + 2) e^{-x}}{x^2} \, \frac{s}{1 + s}
 
-        `past` is the result of `_past`, A is A_n, and x is the step over the relaxation time."""
+        `past` is the result of `_past`, A is A_n, and x is the step over the relaxation time.
+        """
         before, change, share = past
         decay, p = ufl.exp(-x), share * _parabola_weight(x)
         return tuple(decay * a + (_mean_decay(x) - decay + p) * c + p * d for a, c, d in zip(A, before, change))
@@ -211,7 +216,8 @@ def _parabola_weight(x: Any) -> Any:
     .. math:: \frac{x - 2 + (x + 2) e^{-x}}{x^2}
 
     Here x is the length of the step over the relaxation time. The other factor of p is s/(1 + s), with the ratio s of
-    the step to the previous one."""
+    the step to the previous one.
+    """
     small = ufl.lt(x, 1e-2)
     y = ufl.conditional(small, 1, x)
     series = x * (1 / 6 - x / 12 + x**2 / 40 - x**3 / 180 + x**4 / 1008)

@@ -35,8 +35,10 @@ class _Scalar(_Recorded):
 
 class _Nodal(_Recorded):
     """Sum or maximum over the active contacts of a quantity of each contact; 0 if no contact is active.
+
     `quantity` is a function of a contact, the locally owned unknowns and the control. `reduce` is `sum` or `max`.
-    `contacts` None means all contacts of the problem."""
+    `contacts` None means all contacts of the problem.
+    """
 
     def __init__(self, problem, quantity, reduce, contacts=None):
         self._problem, self._quantity, self._reduce = problem, quantity, reduce
@@ -85,7 +87,9 @@ class _UserDefined(_Recorded):
 
 def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[str, Quantity]) -> dict[str, Quantity]:
     """Return {column: quantity} that a user adds, from a target or a function of the `Problem` for each.
-    A name that is `taken` or no word, or another value, is an InputError."""
+
+    A name that is `taken` or no word, or another value, is an InputError.
+    """
     if not isinstance(columns, Mapping):
         raise InputError(f"record = {columns!r}: must be {{name: measure}}")
     found: dict[str, Quantity] = {}
@@ -104,6 +108,7 @@ def user_defined(problem: Any, columns: Mapping[str, Measure], taken: Mapping[st
 
 def standard(problem: Any, timed: bool = False) -> dict[str, Quantity]:
     r"""Return the output quantities that every run records.
+
     Energies, volumes, areas and forces belong to the whole part, tool and support, also where a half or a quarter is
     modelled (`Scene.symmetry_factor`). In plane strain they are per unit depth. Columns:
 

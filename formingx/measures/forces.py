@@ -18,7 +18,8 @@ def positive_direction(contact: Any) -> np.ndarray:
     .. math:: -\frac{m}{|m|}
 
     The result has shape (components,), and is +Z for a fixed tool. m is the motion per travel
-    (`Contact.travel_vector`)."""
+    (`Contact.travel_vector`).
+    """
     up = np.eye(contact.tool.components)[-1]
     return up if contact.direction is None else -contact.travel_vector / np.linalg.norm(contact.travel_vector)
 
@@ -30,7 +31,9 @@ def tool_factor(scene: Any, contact: Any) -> int:
 
 def support_factor(scene: Any, support: Any) -> int:
     """Return the force on a whole driven support over that on its part in the model.
-    It is a power of 2, and 1 if no mirror plane cuts the support (`MirrorPlanes.factor_of`)."""
+
+    It is a power of 2, and 1 if no mirror plane cuts the support (`MirrorPlanes.factor_of`).
+    """
     (constraint,) = scene.kinematics.in_axes(support, support.constraints())
     nodes = scene.first.mesh.nodes_of(constraint.on)
     return int(scene.symmetry.factor_of(np.stack([nodes.min(0), nodes.max(0)]),

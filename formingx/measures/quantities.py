@@ -12,6 +12,7 @@ from ..mesh.nodes import dof_positions
 
 class Quantity:
     """Base class of output quantities of one problem, such as the height of its pole.
+
     A quantity has a value in a state. Its equation replaces the arc-length constraint in the step to a target.
 
     Attributes:
@@ -28,14 +29,18 @@ class Quantity:
 
     def equation(self, target: float) -> Any:
         r"""Return the equation c(x, lambda) = 0 that the quantity equals a target value, in the user's units.
+
         It is a function of the unknowns x, the control lambda and a PETSc vector. It returns c and dc/dlambda, both
-        dimensionless, and sets the vector to dc/dx."""
+        dimensionless, and sets the vector to dc/dx.
+        """
         raise NotImplementedError
 
 
 class WholePartQuantity(Quantity):
     """Output quantity of the whole part, if only a half, a quarter or an eighth of it is modelled (`Scene.symmetry`).
-    The quantity of the modelled body is multiplied by `factor`, the number of its images that count."""
+
+    The quantity of the modelled body is multiplied by `factor`, the number of its images that count.
+    """
 
     def __init__(self, modelled: Quantity, factor: int):
         self._modelled, self._factor = modelled, factor
@@ -54,7 +59,8 @@ class Linear(Quantity):
     .. math:: q = f(y_0 + a \cdot x), \qquad c(x) = y_0 + a \cdot x - f^{-1}(q^*)
 
     Here c is the residual of its equation for the target value q*. The row a has locally owned entries, shape (n,).
-    Values of f are in the user's units; default is the identity."""
+    Values of f are in the user's units; default is the identity.
+    """
 
     def __init__(self, problem, row, offset=0.0, function=lambda y: y, inverse=lambda v: v):
         self._row, self._offset, self._function, self._inverse = problem.x.duplicate(), offset, function, inverse
@@ -78,7 +84,8 @@ class Form(Quantity):
     .. math:: q = q_0 + s \, I(x), \qquad c(x) = \frac{q - q^*}{s}
 
     Here c is the residual of its equation for the target value q*. I is a dimensionless UFL form of rank 0; s and q_0
-    are in the user's units."""
+    are in the user's units.
+    """
 
     def __init__(self, problem, form, scale, offset=0.0):
         self._problem, self._scale, self._offset = problem, scale, offset

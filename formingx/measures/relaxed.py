@@ -17,12 +17,14 @@ _ADDED_STRAIN = 1e-6
 
 class PoleStressRatio:
     r"""Ratio of the Mises stress at the pole to its value after complete relaxation at the same deformation.
+
     Both stresses are means over the reference volume of the elements at the axis:
 
     .. math:: \sigma = \sqrt{\tfrac{3}{2}} \, |\mathrm{dev}(P F^T)|, \qquad P = \frac{\partial W}{\partial F}
 
     W is `Material.stored_energy` for the present stress, `Material.equilibrium_energy` for the relaxed stress. In the
-    equibiaxial state of a pole, sigma is the stress along the sheet minus the stress through its thickness."""
+    equibiaxial state of a pole, sigma is the stress along the sheet minus the stress through its thickness.
+    """
 
     def __init__(self, problem: Any):
         forms = problem.forms
@@ -47,8 +49,10 @@ class PoleStressRatio:
 
     def evaluate(self) -> float:
         """Return the present Mises stress at the pole over the relaxed one; collective.
+
         If the relaxed stress is 0, a small equibiaxial strain is added, so an undeformed body has the ratio of
-        moduli."""
+        moduli.
+        """
         stored, relaxed, modulus = self._integrals()
         if relaxed < ROUND_OFF * modulus:
             self._strain.value = _ADDED_STRAIN
@@ -58,8 +62,10 @@ class PoleStressRatio:
 
     def _integrals(self) -> np.ndarray:
         """Return the integrals of three stresses over the elements at the pole.
+
         These are the present Mises stress, the Mises stress after complete relaxation, and the largest shear modulus of
-        the materials. The result has the shape (3,) and is equal on all ranks; collective."""
+        the materials. The result has the shape (3,) and is equal on all ranks; collective.
+        """
         totals = np.zeros(3)
         for expression, cells in self._parts:
             if len(cells):
@@ -69,9 +75,11 @@ class PoleStressRatio:
 
     def _expression(self, terms: Any) -> fem.Expression:
         """Return the integrands of `_integrals` at quadrature points, as a compiled expression of shape (3,).
+
         They are the present Mises stress, the relaxed Mises stress and the largest shear modulus. Each is multiplied by
         the reference volume of the body per volume of the reference cell. `terms` are the `MaterialTerms` of a
-        material."""
+        material.
+        """
         forms, e = self._problem.forms, self._strain
         F = ufl.variable(forms.elastic_F * ufl.diag(ufl.as_vector([1 + e, 1 - 2 * e, 1 + e])))
         deviators = [ufl.dev(ufl.diff(energy, F) * F.T) for energy in (terms.stored_energy(F),
@@ -84,6 +92,7 @@ class PoleStressRatio:
 
 class ElasticStretches:
     """Largest principal elastic stretch of each relaxing branch, at n points of every cell.
+
     It is 1 for a relaxed branch. The values at quadrature points are projected to a linear function in each cell, by
     least squares. The points have positions in the reference cell, shape (n, 2).
 
@@ -109,7 +118,9 @@ class ElasticStretches:
 
     def evaluate(self, cells: int) -> np.ndarray:
         """Return the stretches in the present fields, (cells, n, branches); nan for a missing branch.
-        Cells are owned ones, and branches the largest number (`count`)."""
+
+        Cells are owned ones, and branches the largest number (`count`).
+        """
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:
             if len(own):

@@ -16,8 +16,10 @@ _GAUSS = (0.5 - 12**-0.5, 0.5 + 12**-0.5)
 
 class Amplitude(Quantity):
     """Output quantity that is a pressure, a travel, the process time or the control itself.
+
     It has a number in `Scene.items`, -1 for the process time, None for the control. Between two stages the control goes
-    from 0 to 1 and activates or deactivates loads: such a quantity is the load times the control, or 1 - control."""
+    from 0 to 1 and activates or deactivates loads: such a quantity is the load times the control, or 1 - control.
+    """
 
     def __init__(self, problem: Any, number: int | None):
         self._problem, self._number = problem, number
@@ -37,7 +39,9 @@ class Amplitude(Quantity):
 
     def _amplitude(self, control: float) -> float:
         """Return this pressure, travel or time over its scale, at a value of the control.
-        The scale of the process time and of the control is 1."""
+
+        The scale of the process time and of the control is 1.
+        """
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -51,8 +55,10 @@ class Amplitude(Quantity):
 
     def equation(self, target):
         """Return the equation, linear in the control, that this quantity equals a target in the user's units.
+
         It sets a PETSc vector to dc/dx = 0, and returns the dimensionless residual c and its derivative by the
-        control."""
+        control.
+        """
         setting = self._problem.setting
         slope = 1.0 if self._number is None else setting.rate[self._number]
         if self._acts and setting.fading:                    # the load fades, or grows, as the control goes to 1
@@ -141,8 +147,10 @@ def change_completed() -> Target:
 
 def _driven(quantity: str, value: float, of: str | None) -> Target:
     """Return the target that a controlled "pressure" or "travel" reaches a value, stress or length.
+
     `of` names the load, support or tool; None is the only one. Binding raises an InputError if there is none, or
-    several."""
+    several.
+    """
     def bind(problem):
         scene, rate = problem.scene, problem.setting.rate
         found = [i for i, t in enumerate(scene.items)
@@ -280,7 +288,8 @@ def bind_pole_stretch(problem: Any) -> Quantity:
     .. math:: \lambda = (h / h_0)^{-1/2} \text{ (axisymmetric)}, \qquad \lambda = (h / h_0)^{-1} \text{ (plane strain)}
 
     Here h is the current thickness on the axis, h_0 the thickness on the first mesh of the run. In a membrane the
-    stretch is 1 + du_r/dR."""
+    stretch is 1 + du_r/dR.
+    """
     low, high = _pole(problem)
     pole = probe(problem, [(0.0, low), (0.0, high)])
     row, power = pole.stretch_row()
@@ -296,8 +305,10 @@ def bind_volume(problem: Any, form: Any = None) -> Quantity:
 
 def _volume(problem: Any, form: Any = None) -> Quantity:
     """Return the volume swept by the loaded face of the modelled body as an output quantity.
+
     On a remeshed body it includes the volume that the face swept on earlier meshes. `form` is the integral, the result
-    of `swept_volume`; None to build it."""
+    of `swept_volume`; None to build it.
+    """
     earlier = 0.0
     if problem.scene.state_transfer is not None:
         old, state = problem.scene.state_transfer.before
@@ -318,7 +329,8 @@ def swept_volume(problem: Any) -> Any:
     .. math:: V = -\int_0^1 \int_{\Gamma} u \cdot a(t u) \, dS \, dt
 
     a(t u) is the area vector of the face at the displacement t u. For an axisymmetric body it is of degree 2 in t, so
-    the two-point Gauss rule in t is exact. A scene without a controlled pressure with a face is an InputError."""
+    the two-point Gauss rule in t is exact. A scene without a controlled pressure with a face is an InputError.
+    """
     driven = next((t for t in problem.scene.drivable if t.quantity == "pressure"), problem.scene.driven)
     if driven is None or driven.on is None:
         what = "no driven pressure whose face would enclose" if driven is None else f"{driven!r}, which has no face for"
@@ -339,7 +351,9 @@ def _displacement(problem, points, factors):
 
 def _pole(problem):
     """Return the lowest and the highest Z on the axis, on the first mesh, length.
-    A mesh without a boundary "axis" is an InputError."""
+
+    A mesh without a boundary "axis" is an InputError.
+    """
     mesh = problem.scene.first.mesh
     if "axis" not in mesh.boundaries:
         raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}: elsewhere take"
@@ -353,5 +367,6 @@ def is_met(target: Target, size: float, value: float) -> bool:
 
     .. math:: |v - v^*| \le 10^{-12} \max(|v|, |v^*|, size)
 
-    `size` is the scale of the quantity, in the user's units (`Quantity.size`)."""
+    `size` is the scale of the quantity, in the user's units (`Quantity.size`).
+    """
     return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)

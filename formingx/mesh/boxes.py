@@ -13,7 +13,9 @@ _CHUNK = 2**18      # pairs that are compared at a time
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
     """Yield indices i and j, (k,) each, of boxes that overlap or touch, every pair once.
-    The lower and upper corners are finite, shape (n, 2)."""
+
+    The lower and upper corners are finite, shape (n, 2).
+    """
     if len(low)**2 <= MAX_COMPARED:
         pairs, count = np.empty((0, 2), dtype=int), 8 * len(low)
         while len(pairs) < count:
@@ -45,7 +47,9 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
 
 def _morton_codes(points: np.ndarray) -> np.ndarray:
     """Return the positions of points, shape (n, 2), on Morton's space-filling curve, integers, shape (n,).
-    Points that follow each other on the curve are mostly close together in the plane."""
+
+    Points that follow each other on the curve are mostly close together in the plane.
+    """
     size = np.ptp(points, axis=0).max() or 1.0
     grid = ((points - points.min(0)) / size * (2**16 - 1)).astype(np.int64)
     for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):

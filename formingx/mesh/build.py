@@ -105,7 +105,9 @@ def disc(*, radius: float, thickness: Thickness | Mapping[str, Thickness], accur
 
 def _preset(accuracy: str, low: float, high: float, layers: Mapping[str, Any]) -> tuple[int, list[int]]:
     """Return the number of elements along the radius of a disc for an accuracy, and the numbers through its layers.
-    Layers are {name: function of radii (n,), that returns the thickness (n,), length}, from radius `low` to `high`."""
+
+    Layers are {name: function of radii (n,), that returns the thickness (n,), length}, from radius `low` to `high`.
+    """
     along, usual = ACCURACY[accuracy]
     R = np.linspace(low, high, along + 1)
     thick = np.array([min(float(thickness_at(R).max()) / (high - low), 1.0) for thickness_at in layers.values()])
@@ -127,7 +129,9 @@ def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coor
 
 def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
     """Return the argument {radius: relative size} `concentrate` of `disc`, checked and sorted by radius.
-    A radius that is not on the disc, or a size not between 1e-6 and 1, is an InputError."""
+
+    A radius that is not on the disc, or a size not between 1e-6 and 1, is an InputError.
+    """
     if not isinstance(concentrate, Mapping) or not concentrate:
         raise InputError(f"disc: concentrate = {concentrate!r}: must be {{reference radius: relative size}}")
     sizes = {}
@@ -143,12 +147,14 @@ def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) 
 
 def _concentrated(low: float, high: float, along: int, sizes: dict[float, float]) -> np.ndarray:
     r"""Return the radii at the ends of elements that are small near given radii, shape (along + 1,), length.
+
     With relative sizes s_i at radii R_i, and D the largest distance of a radius from the nearest R_i, the relative size
     is
 
     .. math:: s(R) = \min_i \left[s_i + (1 - s_i) \frac{|R - R_i|}{D}\right]
 
-    Each R_i is the end of an element; fewer elements than intervals between the R_i are an InputError."""
+    Each R_i is the end of an element; fewer elements than intervals between the R_i are an InputError.
+    """
     radii, small = np.array(list(sizes)), np.array(list(sizes.values()))
     ends = np.unique([low, *radii, high])
     if along < len(ends) - 1:
@@ -344,8 +350,10 @@ def _checked_points(name: str, points: Any) -> np.ndarray:
 def _mesh(kind: str, place: Callable[[np.ndarray], np.ndarray], ends: np.ndarray, fixed: Any, layers: list[str],
           through: list[np.ndarray], sides: tuple, comm: MPI.Comm) -> Mesh:
     """Return the mesh of quadratic triangles on rows and columns of nodes, with diagonals as on a chessboard.
+
     `place` maps coordinates (k,) to nodes of all rows, (rows, k, 2), length; `ends` of columns (n + 1,) and `fixed`
-    ones (m,) are coordinates. `sides` name first column, last column, first row, last row."""
+    ones (m,) are coordinates. `sides` name first column, last column, first row, last row.
+    """
     points = place(with_middles(ends))
     number = np.arange(points.shape[0] * points.shape[1]).reshape(points.shape[:2])
     triangles, first = {}, 0

@@ -16,8 +16,10 @@ _C = CFunctions("mesh/check.c")
 
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
     """Raise an InputError, with the position, for invalid triangles in the reference configuration.
+
     Nodes have shape (n, 2), length, triangles (m, 3 or 6). Elements must be finite, not inverted, not overlapping, and
-    in one piece."""
+    in one piece.
+    """
     bad = np.flatnonzero(~np.isfinite(points).all(1))
     if len(bad):
         raise InputError(f"{what}: a node has the coordinates {show(points[bad[0]])}: must be finite numbers")
@@ -51,7 +53,9 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 def connected_pieces(triangles: np.ndarray) -> np.ndarray:
     """Return a number for each triangle that is equal within a connected piece of the body, shape (m,).
-    triangles: node numbers of the corners, shape (m, 3). The number is 0 for the piece with the lowest node number."""
+
+    triangles: node numbers of the corners, shape (m, 3). The number is 0 for the piece with the lowest node number.
+    """
     nodes, corners = np.unique(triangles, return_inverse=True)
     corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
     while True:
@@ -64,7 +68,9 @@ def connected_pieces(triangles: np.ndarray) -> np.ndarray:
 
 def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
     """Raise an InputError unless each edge has one mid-edge node, no corner and of no other edge.
-    Nodes have shape (n, 2), length, triangles (m, 3 or 6); three nodes pass."""
+
+    Nodes have shape (n, 2), length, triangles (m, 3 or 6); three nodes pass.
+    """
     if triangles.shape[1] != 6:
         return
     rows = np.concatenate([np.column_stack([np.sort(triangles[:, [i, j]], axis=1), triangles[:, k]])
@@ -83,7 +89,9 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 def inverted(nodes: np.ndarray) -> np.ndarray:
     """Return a mask (m,) of triangles (m, 3 or 6, 2) whose Jacobian vanishes at a node or changes sign.
-    Triangles of three nodes have False."""
+
+    Triangles of three nodes have False.
+    """
     if nodes.shape[1] != 6:
         return np.zeros(len(nodes), dtype=bool)
     a, b, c, ab, bc, ac = (nodes[:, i] for i in range(6))
@@ -99,8 +107,10 @@ def inverted(nodes: np.ndarray) -> np.ndarray:
 
 def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: str) -> np.ndarray:
     """Return the edges of the outline, which belong to one element only, as node numbers, shape (k, 2).
+
     `turn` is 1 for counter-clockwise triangles, (m, 3), else -1. Two elements on the same side of an edge are an
-    InputError."""
+    InputError.
+    """
     directed, edges, numbers, times = edges_of(triangles)
     side = np.where(directed[:, 0] < directed[:, 1], 1, -1) * np.tile(turn, 3)           # side of the element
     sides = np.zeros(len(edges))
@@ -119,8 +129,10 @@ def crossing_point(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
 
 
 def crossing_edges(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the indices of edges that cross, or touch anywhere but in a common node, (m, 2), m > 0. Ends of edges have
-    shape (n, 2), length, edges their rows (k, 2)."""
+    """Yield the indices of edges that cross, or touch anywhere but in a common node, (m, 2), m > 0.
+
+    Ends of edges have shape (n, 2), length, edges their rows (k, 2).
+    """
     low, high = points[edges].min(1), points[edges].max(1)
     tolerance = ROUND_OFF * float((high - low).max())
     for first, second in overlapping(low - tolerance, high + tolerance):

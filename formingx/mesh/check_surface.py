@@ -13,8 +13,10 @@ _FOLD = -0.9
 
 def check_surface(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
     """Raise an InputError, with the position, for invalid triangles of a surface; a flat one is checked in its plane.
+
     Nodes have shape (n, 3), length, triangles (m, 3). Elements must not be flat or folded, two may share an edge, and
-    the surface is in one piece without coincident nodes."""
+    the surface is in one piece without coincident nodes.
+    """
     middle = points.mean(0)
     plane = np.linalg.svd(points - middle, full_matrices=False)[2] if np.isfinite(points).all() else np.eye(3)
     size = float(np.ptp(points, axis=0).max())

@@ -91,7 +91,9 @@ is hardly stretched there and needs no more elements through it."""
 
 def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_through: bool = False) -> Mesh:
     """Return a mesh of the same body with short columns of elements at the fillets of its tools.
-    The mesh itself is returned if the script gave its elements, if it was deformed, or if it is no thin sheet."""
+
+    The mesh itself is returned if the script gave its elements, if it was deformed, or if it is no thin sheet.
+    """
     preset, columns = mesh.preset, mesh.columns
     if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
         return mesh
@@ -125,8 +127,10 @@ def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_t
 def _fewest_unknowns(s: np.ndarray, size: np.ndarray, fillets: list[tuple[FilletInSheet, bool, np.ndarray]],
                      constrained: list[float], thickness: float, fineness: Fineness) -> tuple[np.ndarray, int]:
     """Return the largest lengths of columns, shape (n,), and the number of elements through the sheet.
+
     They have the fewest unknowns with a small enough estimated error on every fillet, given as (fillet, False for a lip
-    at a constrained end, distances (n,)). s, `size` and thickness are lengths."""
+    at a constrained end, distances (n,)). s, `size` and thickness are lengths.
+    """
     choices, longest = [], s[-1] / fineness.along
     for through in range(1, fineness.max_through + 1):
         errors, lengths, sizes = [0.0], [longest], [size]
@@ -155,8 +159,10 @@ def _sharp_fillet(item: Any, fillet: FilletInSheet, thickness: float, accuracy: 
 
 def is_thick_sheet(mesh: Mesh) -> bool:
     """Return True for a sheet from `disc` or `parison` whose thickness is 1/10 to 1/4 of its length.
+
     The tools that it touches do not choose its elements (`for_contacts`). A thicker body is a block, whose wall is of
-    no interest."""
+    no interest.
+    """
     if mesh.preset is None or mesh.columns is None:
         return False
     ends = mesh.columns.ends
@@ -177,6 +183,7 @@ def _bend(fillet: FilletInSheet, thickness: float) -> float:
 
 def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside: bool) -> float:
     r"""Return the relative error of the wall on a fillet that is due to the number of elements through the sheet.
+
     With the thickness h0, radius r of the fillet, inverse stretch q, n elements and change s of the logarithm of the
     wall over the fillet it is the larger of
 
@@ -184,7 +191,8 @@ def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside
 
     The second error is that of a convex fillet over which the sheet is drawn. A wall thicker than the radius counts as
     one as thick as the radius: such an edge is reported. `through` is n, and `inside` is False for a lip beside a
-    constrained end."""
+    constrained end.
+    """
     relative = min(_bend(fillet, thickness), 1.0) / max(fillet.area_ratio, 1e-6)
     error = _THROUGH * relative / fillet.stretch / through**1.75
     if inside and not fillet.concave:
@@ -194,12 +202,14 @@ def _error_through(fillet: FilletInSheet, thickness: float, through: int, inside
 
 def _column_length(fillet: FilletInSheet, error: float) -> float:
     r"""Return the length of a column in the reference configuration that has a given error of the wall on a fillet.
+
     A column of the deformed length l has the larger of the errors
 
     .. math:: a_1 \Bigl(\frac{l}{q^{3/2} r}\Bigr)^{7/4}, \quad a_2 s \Bigl(\frac{l}{r}\Bigr)^2
 
     on a concave fillet, and the second one on a convex fillet (symbols as in `_error_through`). The error is relative
-    to the wall."""
+    to the wall.
+    """
     change = max(fillet.wall_change, _MIN_WALL_CHANGE)
     relative = np.sqrt(error / (_ALONG_CONVEX * change))
     if fillet.concave:
@@ -209,12 +219,14 @@ def _column_length(fillet: FilletInSheet, error: float) -> float:
 
 def _on_flats(flats: FlatsInSheet, s: np.ndarray, thickness: float, error: float) -> np.ndarray:
     r"""Return the largest length of a column at points of a sheet that touch flat faces, shape (n,), length.
+
     A column of the deformed length l, of a wall h, has the error
 
     .. math:: a_3 \Bigl(\frac{l}{\sqrt{\rho h}}\Bigr)^{3/2}
 
     with the radius rho of the free surface when the sheet touches. Lengths s along the sheet, thickness h and the
-    error, relative to the wall, are given."""
+    error, relative to the wall, are given.
+    """
     if not len(flats.positions):
         return np.full(len(s), np.inf)
     length = flats.stretches * np.sqrt(flats.free_radii * thickness * flats.area_ratios)

@@ -15,8 +15,10 @@ Thickness = float | Callable[[float], float] | Mapping[float, float]
 
 def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str, Callable]:
     """Return {layer: function of coordinates (n,), that returns its thickness, shape (n,), length}.
+
     `thickness` is a length, function or table, or {layer: such}; `coordinate` is "R", "Z", or "" if it must be
-    constant. Other values are an InputError."""
+    constant. Other values are an InputError.
+    """
     named = isinstance(thickness, Mapping) and all(isinstance(name, str) for name in thickness)
     layers = dict(thickness) if named else {alone: thickness}
     if not layers:
@@ -26,8 +28,10 @@ def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) ->
 
 def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray], np.ndarray]:
     """Return the thickness of a layer as a function of coordinates, shape (n,), with values of this shape, length.
+
     `given` is a length, function or table {coordinate: length}. An InputError, also of the function, reports a value
-    that is missing or not positive."""
+    that is missing or not positive.
+    """
     if not coordinate or not (callable(given) or isinstance(given, Mapping)):
         value = positive(caller, given)
         return lambda x: np.full(len(x), value)
@@ -49,7 +53,9 @@ def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray
 
 def _call(function: Callable, v: float, caller: str, coordinate: str) -> Any:
     """Return the thickness by a user's function at coordinate `v`.
-    An error in it is an InputError that names the thickness and the coordinate."""
+
+    An error in it is an InputError that names the thickness and the coordinate.
+    """
     try:
         return function(v)
     except Exception as error:
@@ -59,7 +65,9 @@ def _call(function: Callable, v: float, caller: str, coordinate: str) -> Any:
 
 def checked_grading(kind: str, grading: Any) -> float:
     """Return the size of the last over the first element as a float.
-    It must lie between 1e-6 and 1e6, otherwise an InputError says so."""
+
+    It must lie between 1e-6 and 1e6, otherwise an InputError says so.
+    """
     grading = positive(f"{kind}: grading", grading)
     if not 1e-6 <= grading <= 1e6:
         raise InputError(f"{kind}: grading = {grading!r}: must be from 1e-6 to 1e6")
@@ -68,8 +76,10 @@ def checked_grading(kind: str, grading: Any) -> float:
 
 def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[int, list[np.ndarray]]:
     """Return the number of elements along a sheet, and the ends of the elements through each layer on [0, 1].
+
     `elements` is (number, division), where the division is a number for all layers, or a number or relative sizes for
-    each. Another form or too many elements are an InputError."""
+    each. Another form or too many elements are an InputError.
+    """
     if not is_sequence(elements) or len(elements) != 2:
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
     along = count(f"{kind}: elements along the {along_what}", elements[0])
@@ -87,7 +97,9 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
 
 def _layer_ends(kind: str, given: Any) -> np.ndarray:
     """Return the ends of the n elements through a layer on [0, 1], shape (n + 1,).
-    `given` is their number or relative sizes, which must be positive."""
+
+    `given` is their number or relative sizes, which must be positive.
+    """
     if not is_sequence(given):
         n = count(f"{kind}: elements through a layer", given)
         if n > MAX_RECTANGLES:
@@ -125,7 +137,9 @@ def with_middles(joints: np.ndarray) -> np.ndarray:
 
 def levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinates: np.ndarray) -> np.ndarray:
     """Return the distances of all rows of nodes from the first face of a sheet, shape (rows, n), length.
-    Rows lie at the ends and middles of elements; coordinates have shape (n,)."""
+
+    Rows lie at the ends and middles of elements; coordinates have shape (n,).
+    """
     rows = [np.zeros(len(coordinates))]
     for thickness_at, ends in zip(layers.values(), through):
         h, base = thickness_at(coordinates), rows[-1]

@@ -107,7 +107,9 @@ is 1.)"""
 
 def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bool) -> Iterator[FilletInSheet]:
     """Yield the fillets of a section tool that a sheet may reach, with the part of the sheet on each.
-    The undeformed face has points (R, Z), shape (n, 2), length. A `moving` tool moves by an unknown amount."""
+
+    The undeformed face has points (R, Z), shape (n, 2), length. A `moving` tool moves by an unknown amount.
+    """
     s = length_along(face)
     if moving:
         x, _, curvature = _surface(tool, face, s[-1])
@@ -132,7 +134,9 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
 
 def flats_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool) -> FlatsInSheet:
     """Return the points of a sheet that may touch the straight pieces of a fixed section tool.
-    The undeformed face has points (R, Z), shape (n, 2), length."""
+
+    The undeformed face has points (R, Z), shape (n, 2), length.
+    """
     found = _touched(tool, face)
     straight = np.flatnonzero(found.curvature == 0)
     stretches = [found.stretches(axisymmetric, np.arange(max(k - 1, 0), min(k + 2, len(found.points))))
@@ -155,7 +159,9 @@ def _touched(tool: Any, face: np.ndarray) -> _Touched:
 
 def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return points of a section tool along a sheet, (m, 2), normals into it, (m, 2), and curvatures, (m,).
-    Curvatures are absolute, 1/length; the undeformed face has points (n, 2), and `length` is that of the sheet."""
+
+    Curvatures are absolute, 1/length; the undeformed face has points (n, 2), and `length` is that of the sheet.
+    """
     outline = tool.surface()[0]
     pieces = np.diff(outline, axis=0)
     number = np.ceil(np.hypot(*pieces.T) / (_PIECE * np.ptp(outline, axis=0).max())).astype(int)
@@ -172,7 +178,9 @@ def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np
 
 def _groups(curvature: np.ndarray) -> list[np.ndarray]:
     """Return the indices of the points on each arc of a tool: consecutive points of equal curvature above 0. curvature:
-    absolute curvature at each point of the tool, shape (m,), 1/length."""
+
+    absolute curvature at each point of the tool, shape (m,), 1/length.
+    """
     if not len(curvature):
         return []
     same = np.isclose(curvature[1:], curvature[:-1], rtol=1e-3)
@@ -182,7 +190,9 @@ def _groups(curvature: np.ndarray) -> list[np.ndarray]:
 
 def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) -> np.ndarray:
     """Return the radius of the largest ball outside the tool at points x, (m, 2), shape (m,), length.
-    Normals into the tool have shape (m, 2); `largest` bounds the radii."""
+
+    Normals into the tool have shape (m, 2); `largest` bounds the radii.
+    """
     low: np.ndarray = np.zeros(len(x))
     high: np.ndarray = np.full(len(x), largest)
     for _ in range(40):
@@ -194,8 +204,10 @@ def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) ->
 
 def _positions(x: np.ndarray, free: np.ndarray, face: np.ndarray, s: np.ndarray) -> np.ndarray:
     """Return the positions along the undeformed sheet of the material that touches a tool, shape (m,), length.
+
     A tool point x, (m, 2), is touched when the radius of the free surface equals its ball `free`, (m,). Each free part
-    of the face (n, 2) is an arc and stretches evenly between sticking ends."""
+    of the face (n, 2) is an arc and stretches evenly between sticking ends.
+    """
     points = np.concatenate([face[:1], x, face[-1:]])
     on_axis = [(end, neighbour) for end, neighbour in ((0, 1), (-1, -2)) if face[end, 0] <= 1e-9 * s[-1]]
     place, sticks = np.full(len(points), np.nan), np.zeros(len(points), bool)

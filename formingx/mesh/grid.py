@@ -95,7 +95,9 @@ def gathered(mesh: Mesh) -> Grid:
 
 def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
     """Return the distributed mesh of the grid that `make` returns on rank 0; collective.
-    Invalid elements, or its own InputError, raise an InputError on all ranks, with the name `what`."""
+
+    Invalid elements, or its own InputError, raise an InputError on all ranks, with the name `what`.
+    """
     error, shape = None, None
     if comm.rank == 0:
         try:
@@ -117,9 +119,11 @@ def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
 
 def _tagged(grid: Grid, what: str) -> tuple:
     """Return the arrays of a grid with its names as tags, in the order of nodes of DOLFINx.
+
     They are cells (m, 3 or 6), points (n, 2 or 3), length, cell tags (m,), edges (k, 2 or 3), edge tags (k,), {layer:
     tag} and {boundary: tags}; an edge of several boundaries has its own tag. Invalid elements, layers or edges are an
-    InputError."""
+    InputError.
+    """
     triangles = np.concatenate(list(grid.layers.values()))
     used = np.unique(triangles)
     number = np.full(len(grid.points), -1, dtype=np.int64)
@@ -155,7 +159,9 @@ def _tagged(grid: Grid, what: str) -> tuple:
 
 def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
     """Return {(lower, higher node number of the ends): [node number of the middle]} of all edges of triangles.
-    The list is empty for triangles of three nodes."""
+
+    The list is empty for triangles of three nodes.
+    """
     found: dict[tuple[int, int], list[int]] = {}
     for i, j, k in _EDGES:
         ends = np.sort(triangles[:, [i, j]], axis=1).tolist()
@@ -166,8 +172,10 @@ def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
 def _element_edges(edges: np.ndarray, known: dict[tuple[int, int], list[int]], caller: str,
                    points: np.ndarray) -> list[list[int]]:
     """Return [first end, last end, middle] of each boundary edge (k, 2), as node numbers; [] if all are foreign.
+
     `known` maps the sorted ends of element edges to [middle]; curves outside, such as tools, give []. Only some in
-    elements is an InputError."""
+    elements is an InputError.
+    """
     pairs = [(int(a), int(b)) for a, b in edges]
     found = [[a, b, *known[min(a, b), max(a, b)]] for a, b in pairs if (min(a, b), max(a, b)) in known]
     if found and len(found) < len(edges):

@@ -30,8 +30,10 @@ class LocatedPoints(NamedTuple):
 def locate(mesh: Any, points: np.ndarray, size: float, cells: np.ndarray | None = None, within: str = "mesh"
            ) -> LocatedPoints:
     """Return the points that lie in cells of this rank, each found once; collective.
+
     Points are reference positions (n, 2 or 3), length, equal on all ranks; inside is up to 0.001 cell sizes from one of
-    the cells (None: all). A point in none is an InputError."""
+    the cells (None: all). A point in none is an InputError.
+    """
     comm, X, cmap, dim = mesh.comm, mesh.geometry.x, _compat.coordinate_map(mesh), mesh.topology.dim
     nodes, owned = _compat.cell_nodes(mesh), own_cells(mesh)
     cells = owned if cells is None else cells[cells < len(owned)]

@@ -180,7 +180,9 @@ class Mesh:
 
     def _columns_with_part(self, limits: tuple, axis: int, tolerance: float, part: tuple) -> Columns | None:
         """Return the `Columns` of the mesh, which end at the limits of a new part of a boundary; None without columns.
-        The axis is 0 for R, 1 for Z; limits and tolerance are lengths; `part` has the arguments of `with_part`."""
+
+        The axis is 0 for R, 1 for Z; limits and tolerance are lengths; `part` has the arguments of `with_part`.
+        """
         if self.columns is None:
             return None
         columns, make = self.columns, self.columns.make

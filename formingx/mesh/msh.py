@@ -61,7 +61,9 @@ class Content(NamedTuple):
 
 def content(file: str | os.PathLike) -> Content:
     """Return nodes, elements and names of a gmsh file (MSH 2.2 or 4.1, text or binary).
-    An InputError names the section of an unreadable file."""
+
+    An InputError names the section of an unreadable file.
+    """
     file = os.fspath(file)
     try:
         with open(file, "rb") as stream:
@@ -100,8 +102,10 @@ def content(file: str | os.PathLike) -> Content:
 
 def read(file: str | os.PathLike) -> Grid:
     """Return the grid in a gmsh file; physical groups name the layers (dimension 2) and the boundaries (dimension 1).
+
     A damaged file, no group of dimension 2, elements other than triangles, or ones out of the plane are an
-    InputError."""
+    InputError.
+    """
     file = os.fspath(file)
     found = content(file)
     if not any(b.dim > 0 for b in found.blocks):
@@ -154,8 +158,10 @@ def write(grid: Grid, file: str | os.PathLike) -> None:
 
 def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray, file: str) -> dict[str, np.ndarray]:
     """Return {name of a physical group: its elements, (m, nodes)} for one dimension.
+
     Elements are indices into the sorted node `numbers`, (n,). Another type than in `kinds`, {gmsh type: nodes}, or a
-    missing node is an InputError."""
+    missing node is an InputError.
+    """
     parts: dict[str, list[np.ndarray]] = {}
     what = "triangles" if dim == 2 else "edges"
     tags = {group for b in found.blocks if b.dim == dim for group in b.groups}
@@ -182,7 +188,9 @@ def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray,
 
 def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
     """Yield the names and contents of the sections of a file with the content `data`.
-    A section without end, or content outside, is an InputError."""
+
+    A section without end, or content outside, is an InputError.
+    """
     begin, offset = re.compile(rb"\s*\$(\w{1,40})[ \t]*\r?\n"), 0
     while match := begin.match(data, offset):
         end = data.find(b"$End" + match[1], match.end())
@@ -197,7 +205,9 @@ def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
 
 def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
     """Return (version, True if binary, byte order "<" or ">", bytes of a count) from the section $MeshFormat.
-    A count has 4 or 8 bytes. Another version is an InputError."""
+
+    A count has 4 or 8 bytes. Another version is an InputError.
+    """
     words = body.split(b"\n")[0].decode("ascii", "replace").split()
     if len(words) != 3 or words[0] not in ("2.2", "4.1") or words[1] not in ("0", "1") or words[2] not in ("4", "8"):
         raise InputError(f"mesh file {file!r}: format {' '.join(words)[:40]!r}: must be MSH 2.2 or 4.1 (gmsh:"
@@ -213,7 +223,9 @@ def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
 
 def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
     """Return {(dimension, number of a group): name} from the section $PhysicalNames.
-    A line of another form, or a group with two names, is an InputError."""
+
+    A line of another form, or a group with two names, is an InputError.
+    """
     lines = [line for line in body.decode("utf-8", "replace").splitlines() if line.strip()]
     names: dict[tuple[int, int], str] = {}
     if lines and lines[0].strip() != str(len(lines) - 1):
@@ -244,7 +256,9 @@ def _nodes_2(section: Section) -> tuple[np.ndarray, np.ndarray]:
 
 def _elements_2(section: Section) -> list[Block]:
     """Return a block for each (element type, group, entity) from the section $Elements of an MSH 2.2 file.
-    An unknown element type is an InputError."""
+
+    An unknown element type is an InputError.
+    """
     found: dict[tuple[int, int, int], list] = {}
     n, done = section.line() if section.binary else checked_count(section.ints(1), section), 0
     while done < n:
@@ -265,7 +279,9 @@ def _elements_2(section: Section) -> list[Block]:
 
 def _groups(section: Section, whole: dict | None = None) -> dict[tuple[int, int], tuple[int, ...]]:
     """Return {(dimension, entity): numbers of its physical groups} from a section of an MSH 4.1 file.
-    A part of an entity, in $PartitionedEntities, is in the groups of the `whole`, the result of $Entities."""
+
+    A part of an entity, in $PartitionedEntities, is in the groups of the `whole`, the result of $Entities.
+    """
     found = {}
     if whole is not None:
         section.sizes(1)                                    # number of partitions
@@ -312,7 +328,9 @@ def _check_total(section: Section, what: str, total: int, parts: list[np.ndarray
 
 def _elements_4(section: Section, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
     """Return the blocks of elements from the section $Elements of an MSH 4.1 file.
-    Groups are {(dimension, entity): numbers of physical groups}; an unknown element type is an InputError."""
+
+    Groups are {(dimension, entity): numbers of physical groups}; an unknown element type is an InputError.
+    """
     blocks = []
     number, total, *_ = section.sizes(4)
     for _ in range(checked_count([number], section)):

@@ -10,7 +10,9 @@ from ..errors import InputError
 
 class Section:
     """Reader of the numbers in a section of a gmsh file.
-    The byte order is "<" or ">", and a count has a width of 4 or 8 bytes. Messages have the name `where`."""
+
+    The byte order is "<" or ">", and a count has a width of 4 or 8 bytes. Messages have the name `where`.
+    """
 
     def __init__(self, body: bytes, binary: bool, order: str, width: int, where: str):
         self._binary, self._order, self._width, self.where = binary, order, width, where
@@ -30,7 +32,9 @@ class Section:
 
     def line(self) -> int:
         """Return the count on the next line, which begins a section of a binary MSH 2.2 file.
-        A missing line is an InputError."""
+
+        A missing line is an InputError.
+        """
         end = self._body.find(b"\n", self._offset)
         word = self._body[self._offset:end].strip()
         if end < 0 or not word.isdigit() or len(word) > 15:
@@ -67,7 +71,9 @@ class Section:
 
     def _take(self, n: int, kind: str) -> np.ndarray:
         """Return the next n numbers of a type, such as "f8", shape (n,); in text files all numbers are floats.
-        A section that is too short is an InputError."""
+
+        A section that is too short is an InputError.
+        """
         if self._binary:
             return self._bytes(n, np.dtype(self._order + kind))
         if n > len(self._values) - self._offset:
@@ -77,7 +83,9 @@ class Section:
 
     def _bytes(self, n: int, kind: np.dtype) -> np.ndarray:
         """Return the next n numbers or records of a type in a binary section, shape (n,).
-        A section that is too short is an InputError."""
+
+        A section that is too short is an InputError.
+        """
         if n * kind.itemsize > len(self._body) - self._offset:
             raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
         found = np.frombuffer(self._body, kind, n, self._offset)

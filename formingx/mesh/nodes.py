@@ -26,7 +26,9 @@ def axes(domain: Any) -> str:
 
 def arguments(function: Callable, coordinates: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
     """Return the coordinates, {name: values (n,), length}, that a function of the reference position takes.
-    They are the first ones, as many as it has positional arguments without a default."""
+
+    They are the first ones, as many as it has positional arguments without a default.
+    """
     try:
         taken = list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):                         # a function of NumPy, for example, has no signature
@@ -76,7 +78,9 @@ def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
 
 def matching_rows(points: np.ndarray, stored: Any, tolerance: float, message: str) -> np.ndarray:
     """Return the row of stored positions (m, d) that coincides with each point (n, d), shape (n,).
-    A point farther than `tolerance`, length, from all of them is an InputError with the message."""
+
+    A point farther than `tolerance`, length, from all of them is an InputError with the message.
+    """
     stored = np.reshape(stored, (-1, points.shape[-1]))
     if not len(points):                                      # a rank without such points
         return np.zeros(0, dtype=int)

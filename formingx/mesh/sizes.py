@@ -18,14 +18,17 @@ def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
 
     .. math:: n(s) = \int_0^s \frac{ds'}{h(s')}
 
-    The trapezoidal rule is used; lengths s and sizes have shape (n,)."""
+    The trapezoidal rule is used; lengths s and sizes have shape (n,).
+    """
     return np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
 
 
 def ends_of_columns(coordinates: np.ndarray, s: np.ndarray, size: np.ndarray, fixed: np.ndarray) -> np.ndarray:
     """Return the ends of columns of elements with given lengths, as coordinates along the sheet, shape (columns + 1,).
+
     Coordinates, lengths s and largest sizes of columns have shape (n,); `fixed` ends, first and last included, must be
-    kept, (m,)."""
+    kept, (m,).
+    """
     number = number_of_columns(s, size)
     marks = np.interp(fixed, coordinates, number)
     ends = [fixed[:1]]

@@ -39,7 +39,9 @@ _NUMBERINGS = {"corners": [0, 1, 2, 3, 4, 5], "around": [0, 2, 4, 1, 3, 5]}
 
 def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> None:
     """Write a grid of six-node triangles (else an InputError) in the text format of `formingx.mesh.text`.
-    numbering: order of the nodes of an element, "corners" first, or "around" (corner, middle, corner, ...)."""
+
+    numbering: order of the nodes of an element, "corners" first, or "around" (corner, middle, corner, ...).
+    """
     order = np.argsort(_NUMBERINGS[_checked_numbering(numbering)])
     if any(t.shape[1] != 6 for t in grid.layers.values()):
         raise InputError("mesh.write: the text format holds six-node triangles; this mesh has three-node ones")
@@ -59,7 +61,9 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
 
 def read(file: str | os.PathLike) -> Grid:
     """Return the grid in a text file of `write`; clockwise elements become counter-clockwise.
-    A missing file, or another format than "six-node triangles", is an InputError with the line."""
+
+    A missing file, or another format than "six-node triangles", is an InputError with the line.
+    """
     lines = _Lines(os.fspath(file))
     *first, version = next(lines, None) or [""]
     if " ".join(first) != _FORMAT or version not in _VERSIONS:
@@ -110,7 +114,9 @@ def read(file: str | os.PathLike) -> Grid:
 
 def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray) -> None:
     """Raise an InputError unless every boundary edge (k, 3) is an edge of an element (m, 6).
-    The node `numbers` of the file, (n,), are for messages."""
+
+    The node `numbers` of the file, (n,), are for messages.
+    """
     edges = {(frozenset(row[[i, j]].tolist()), int(row[k])) for triangles in layers.values() for row in triangles
              for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5))}
     for name, rows in boundaries.items():
@@ -162,8 +168,10 @@ class _Lines(Iterator):
 
     def block(self, count: str, kinds: tuple, what: str, nodes: dict | None = None, all_nodes: bool = False) -> list:
         """Return the next `count` lines of numbers as lists, with node numbers converted to indices.
+
         `kinds` convert the words of each column; `nodes` is {number: index} for all columns but the first, or
-        `all_nodes`. Another form or an unknown node is an InputError."""
+        `all_nodes`. Another form or an unknown node is an InputError.
+        """
         if not (count.isascii() and count.isdigit() and len(count) <= 15) or int(count) < 1:
             raise self.error(f"the count {count!r} must be a whole number of at least 1")
         rows = []

@@ -63,7 +63,8 @@ def shape_quality(corners: np.ndarray) -> np.ndarray:
     .. math:: q = \frac{4 \sqrt{3} \, A}{l_1^2 + l_2^2 + l_3^2}
 
     It is 1 for an equilateral triangle, 0 for a flat one, and negative for a clockwise one. Corners have shape (n, 3,
-    2), in three dimensions (n, 3, 3), length, where q is positive; the result has shape (n,)."""
+    2), in three dimensions (n, 3, 3), length, where q is positive; the result has shape (n,).
+    """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     if corners.shape[2] == 3:
         area = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2

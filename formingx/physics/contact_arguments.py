@@ -16,7 +16,9 @@ _MAX_POINTS = 100
 
 def coefficient(name: str, friction: Any) -> Any:
     """Return the argument `friction` as a number (infinite: "stick", 0: "none") or a function of temperature.
-    Raise `InputError` if it is not "stick", "none", a number from 0, a `Table` or a `FunctionOfTemperature`."""
+
+    Raise `InputError` if it is not "stick", "none", a number from 0, a `Table` or a `FunctionOfTemperature`.
+    """
     words = {"none": 0.0, "stick": math.inf}
     if isinstance(friction, str) and friction in words:
         return words[friction]
@@ -32,8 +34,10 @@ def coefficient(name: str, friction: Any) -> Any:
 
 
 def closures(name: str, nodes: Any) -> int | float | None:
-    """Return `nodes_per_step`: None, a number of nodes from 1, or a share of the nodes of the face below 1. Raise
-    `InputError` for another value."""
+    """Return `nodes_per_step`: None, a number of nodes from 1, or a share of the nodes of the face below 1.
+
+    Another value is an InputError.
+    """
     if nodes is None:
         return None
     return float(nodes) if positive(name, nodes) < 1 else count(name, nodes)

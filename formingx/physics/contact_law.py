@@ -29,7 +29,9 @@ RAMP_EDGE = 1e-7
 
 class ContactStatus(IntEnum):
     """Status of a contact point: open (FREE), sticking, or sliding.
-    SLIDES is sliding along the positive tangent of the tool, SLIDES_BACK along the negative tangent."""
+
+    SLIDES is sliding along the positive tangent of the tool, SLIDES_BACK along the negative tangent.
+    """
 
     SLIDES_BACK = -1
     STICKS = 0
@@ -533,7 +535,8 @@ class Law(NormalLaw):
                   d & d \ge \theta \end{cases}
 
         d: signed distances, positive inside, shape (n,), length. F times the penalty k is the normal traction. Without
-        separation F is max(d + theta, 0), and d + theta at `bonded` points, which may be negative (tension)."""
+        separation F is max(d + theta, 0), and d + theta at `bonded` points, which may be negative (tension).
+        """
         F, slope = np.empty(len(d)), np.empty(len(d))
         _C.ramp(len(d), self.theta, self.adhesive, d, None if bonded is False else bonded, F, slope)
         return F, slope
@@ -543,14 +546,17 @@ class Law(NormalLaw):
 
         .. math:: d = \begin{cases} N/k & N > k \theta \\ 2 \sqrt{N \theta / k} - \theta & \text{else} \end{cases}
 
-        For a contact that does not separate, d is N/k - theta."""
+        For a contact that does not separate, d is N/k - theta.
+        """
         over = pressure / (self.k * self.theta)
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.adhesive else over - 1)
 
     @property
     def friction(self) -> np.ndarray:
         """Ratio of tangential to normal traction at which a point slides, shape () or (n,); infinite for stick.
-        With a shear limit that is no constant ratio, it is that of a pressure that tends to 0."""
+
+        With a shear limit that is no constant ratio, it is that of a pressure that tends to 0.
+        """
         sticks, mu = np.asarray(self.sticks), np.asarray(self.mu)
         if self.shear_limit is not None:
             mu = self.shear_limit(np.zeros(mu.shape), np.where(sticks, 0.0, mu))[1]
@@ -562,7 +568,8 @@ class Law(NormalLaw):
         .. math:: \int_{-\theta}^{d} N \, ds = \begin{cases} k (d + \theta)^3 / (12 \theta) & |d| < \theta \\
                   k (d^2/2 + \theta^2/6) & d \ge \theta \end{cases}
 
-        x: shape (n, 2), length. It is 0 for open points, and k (d + theta)^2/2 for a contact that does not separate."""
+        x: shape (n, 2), length. It is 0 for open points, and k (d + theta)^2/2 for a contact that does not separate.
+        """
         d, theta = self.distance(x), self.theta
         if self.adhesive:
             return self.k * np.where(self._bonded(old) | (d > -theta), (d + theta) ** 2 / 2, 0.0)
@@ -579,9 +586,11 @@ class Law(NormalLaw):
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         """Compute the tractions at positions x, shape (n, 2), length, with their stiffness and history.
+
         A point whose `sense`, shape (n,), would reverse sticks for one iteration: else Newton's method would alternate.
         `expected`: distances and slips predicted to first order; those at x differ in second order on a curved tool,
-        which a stiff penalty turns into large tractions."""
+        which a stiff penalty turns into large tractions.
+        """
         n, out = len(x), self._evaluate(x, old, sense, expected)
         N, T, slides = out[2 * n:3 * n], out[3 * n:4 * n], out[4 * n:5 * n]
         return Tractions(out[:2 * n].reshape(n, 2), N, T, slides, lambda: out[5 * n:9 * n].reshape(n, 2, 2),
@@ -590,8 +599,10 @@ class Law(NormalLaw):
     def _evaluate(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> np.ndarray:
         """Return the output of the C function `tractions` at n positions x, one array of shape (12 n,).
+
         In this order it has the traction vectors (2 n), normal tractions, tangential tractions and senses of sliding (n
-        each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each)."""
+        each), stiffness (4 n), signed distances, elastic slips and tangential stiffness (n each).
+        """
         near, out = self.nearest(x), np.empty(12 * len(x))
         g = dg = limit = grows = None
         if self.has_friction:
@@ -614,7 +625,8 @@ class Law(NormalLaw):
         .. math:: \frac{N n_r}{r}
 
         N is the normal traction, n_r the radial component of the normal of the tool. The stiffness of the elastic slip
-        is added for a sticking point. radius: deformed, shape (n,), length; infinite in plane strain."""
+        is added for a sticking point. radius: deformed, shape (n,), length; infinite in plane strain.
+        """
         turned = super().hoop_stiffness(x, old, radius)
         if not self.has_friction:
             return turned
@@ -623,15 +635,19 @@ class Law(NormalLaw):
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and elastic slips at x, shape (n, 2), length, with their gradients, shape (n, 2).
-        Slips are 0 without history."""
+
+        Slips are 0 without history.
+        """
         near = self.nearest(x)
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
         return Motion(x, near.distance, near.normal, g, dg)
 
     def one_sided_stiffness(self, x: np.ndarray, old: ContactHistory | None, newly_closed: np.ndarray) -> np.ndarray:
         """Return the stiffness at an accepted state for the next step, shape (n, 2, 2), stress/length.
+
         A point whose gap just closed (mask `newly_closed`, shape (n,)) has the distance -theta, where the stiffness is
-        0. On the tangent it would slip, so it gets the stiffness at -theta/2."""
+        0. On the tangent it would slip, so it gets the stiffness at -theta/2.
+        """
         near, now = self.nearest(x), self.tractions(x, old)
         # a body may rest at the outer edge of the ramp
         about = np.abs(near.distance / self.theta + 1.025) < 0.025 + 2 * RAMP_EDGE
@@ -645,7 +661,9 @@ class Law(NormalLaw):
 
     def _slip(self, x: np.ndarray, near: Nearest, old: ContactHistory) -> tuple[np.ndarray, np.ndarray]:
         """Return the elastic slip that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
-        The result is stored for repeated calls. near: result of `nearest` at x."""
+
+        The result is stored for repeated calls. near: result of `nearest` at x.
+        """
         if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
             g, dg = np.empty(len(x)), np.empty((len(x), 2))
             _C.elastic_slips(len(x), self.theta, x, near.normal, near.curvature, *old, g, dg)
@@ -655,8 +673,10 @@ class Law(NormalLaw):
 
 def symmetric_stiffness(law: ContactLaw, x: np.ndarray, old: ContactHistory | None) -> np.ndarray:
     """Return a symmetric stiffness of points in a section, shape (n, 2, 2), stress/length, for second variations.
+
     It leaves out the coupling of sliding friction to the normal displacement. That has no energy, and its symmetric
-    part would count every such point as an unstable mode."""
+    part would count every such point as an unstable mode.
+    """
     if not law.has_friction:
         return law.tractions(x, old).stiffness
     tangent = law.nearest(x).tangent

@@ -265,7 +265,9 @@ class ThreeD(Kinematics):
 
     def rigid_motions(self):
         """Return the rigid motions in the plane of the sheet, and the translation normal to it, by name.
-        Tension resists the others: a flat sheet on one straight rim counts as supported."""
+
+        Tension resists the others: a flat sheet on one straight rim counts as supported.
+        """
         return {**{f"translation along {a}": lambda X, k=k: 0 * X + np.eye(3)[k] for k, a in enumerate(self.axes)},
                 "rotation about z": lambda X: np.stack([-X[:, 1], X[:, 0], 0 * X[:, 0]], 1)}
 
@@ -280,7 +282,8 @@ def volume_ratio(F):
 
     .. math:: J = \det F
 
-    Products that vanish for an F with block structure are left out."""
+    Products that vanish for an F with block structure are left out.
+    """
     J = F[2, 2] * (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
     if is_block(F):
         return J
@@ -289,14 +292,18 @@ def volume_ratio(F):
 
 def is_block(F):
     """Return True if the entries 13, 23, 31 and 32 of F are zero by construction, as in a section.
-    They are expressions in the F of a non-axisymmetric mode."""
+
+    They are expressions in the F of a non-axisymmetric mode.
+    """
     across = ((0, 2), (1, 2), (2, 0), (2, 1))
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
 
 
 def in_section_order(F):
     """Return F (UFL, shape (3, 3)) with the axes 2 and 3 exchanged if axis 2 is separate by construction.
-    So it is for laws that depend on the direction in a sheet in three dimensions, whose axis 2 is the normal."""
+
+    So it is for laws that depend on the direction in a sheet in three dimensions, whose axis 2 is the normal.
+    """
     across = ((0, 1), (1, 2), (1, 0), (2, 1))
     if is_block(F) or not all(isinstance(F[place], Zero) for place in across):
         return F
@@ -353,6 +360,7 @@ def _in_plane_determinant(F):
 
 def _powers_across(F, b, a):
     r"""Return the terms that the entries b = (C13, C23) add to tr C^a, to second order.
+
     C is F^T F, A its in-plane part with an eigenvalue x, and c = C33. To second order x becomes x + b^2/(x - c), so the
     terms are
 
@@ -360,7 +368,8 @@ def _powers_across(F, b, a):
               = a \, (x c)^{(s - 1)/2} \, \frac{\sinh(s y)}{\sinh y}, \quad s = a - 1, \quad y = \tfrac{1}{2} \ln(x/c)
 
     The second form loses no digits where stretches coincide. At b = 0 the terms are exact in value and in first and
-    second derivatives by F. Eigenvalues of A differ by at least 2e-8 of their mean, which avoids 0/0."""
+    second derivatives by F. Eigenvalues of A differ by at least 2e-8 of their mean, which avoids 0/0.
+    """
     F2, c, s = ufl.as_matrix([[F[0, 0], F[0, 1]], [F[1, 0], F[1, 1]]]), F[2, 2] ** 2, a - 1
     A = F2.T * F2
     m, J2 = ufl.tr(A) / 2, ufl.det(F2) ** 2
@@ -382,7 +391,8 @@ def cofactor_change(F, H):
 
     .. math:: (\delta \, \mathrm{cof} F)_{ij} = F_{ac} H_{bd} + H_{ac} F_{bd} - F_{ad} H_{bc} - H_{ad} F_{bc}
 
-    Here (i, a, b) and (j, c, d) are cyclic permutations of (1, 2, 3)."""
+    Here (i, a, b) and (j, c, d) are cyclic permutations of (1, 2, 3).
+    """
     def entry(i, j):
         (a, b), (c, d) = ((i + 1) % 3, (i + 2) % 3), ((j + 1) % 3, (j + 2) % 3)
         return F[a, c] * H[b, d] + H[a, c] * F[b, d] - F[a, d] * H[b, c] - H[a, d] * F[b, c]

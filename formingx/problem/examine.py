@@ -21,8 +21,10 @@ _MIN_COLUMNS = 3           # smallest number of columns of elements of a compres
 
 class Examination:
     """Examination of the last good state, or None, and of a failed attempt; collective.
+
     The attempt is the last iterate of the failed Newton iteration (x, control, last corrections dx and dcontrol), or
-    None. facts: {field of a `Diagnosis`: its value}."""
+    None. facts: {field of a `Diagnosis`: its value}.
+    """
 
     def __init__(self, problem: Any, last: Any, attempt: Any):
         self.facts: dict[str, Any] = {}
@@ -48,7 +50,9 @@ class Examination:
 
     def _find_worst(self, elements: Body) -> None:
         """Store the smallest J, the worst shape of an element, and the largest use of a material's stretch limit.
-        The use is (I1 - 3) / (limit of I1 - 3), with tr F^T F as I1. `facts` gets them under names of `Diagnosis`."""
+
+        The use is (I1 - 3) / (limit of I1 - 3), with tr F^T F as I1. `facts` gets them under names of `Diagnosis`.
+        """
         problem, facts = self._problem, self.facts
         facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, elements)
         facts["shape"] = float((elements.quality / elements.initial_quality).min())
@@ -63,7 +67,9 @@ class Examination:
 
     def _find_compressed(self, elements: Body) -> None:
         """Store the mean stretch and both ends of the longest part of a sheet that is compressed along its section.
-        elements: the elements in the last good state. The values are stored in `facts["shortened"]`."""
+
+        elements: the elements in the last good state. The values are stored in `facts["shortened"]`.
+        """
         columns = self._problem.scene.mesh.columns
         if columns is None:
             return
@@ -84,7 +90,9 @@ class Examination:
 
     def _examine_attempt(self, x: Any, attempt: Any) -> None:
         """Store the smallest J, the residual and the number of changes of contact status of the failed attempt.
-        x: work vector of unknowns. attempt: the last iterate. The values are stored in `facts`."""
+
+        x: work vector of unknowns. attempt: the last iterate. The values are stored in `facts`.
+        """
         problem, facts = self._problem, self.facts
         x.array_w[:] = attempt.x
         failed = body(problem, x, attempt.control)
@@ -97,7 +105,9 @@ class Examination:
 
     def draw(self, file: Any, title: str) -> None:
         """Draw the deformed last good state with J, the worst points and the tools to a file; rank 0 draws.
-        Raise `InputError` for a membrane, which has no elements to draw, or without a good state."""
+
+        Raise `InputError` for a membrane, which has no elements to draw, or without a good state.
+        """
         if self._elements is None:
             raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"
                              " thickness, and without a good state there is no shape")
@@ -120,7 +130,9 @@ def _smallest_J(problem: Any, elements: Body) -> tuple[float, Place, tuple]:
 
 def _residuals(problem: Any, x: Any, control: float) -> tuple[dict[str, float], Place, np.ndarray]:
     """Return the residual of each field, and the `Place` and position (R, Z), length, of the largest residual force.
-    Residuals are {"displacement", "pressure" or "multipliers": norm over the norm of the support forces}."""
+
+    Residuals are {"displacement", "pressure" or "multipliers": norm over the norm of the support forces}.
+    """
     out, comm = x.duplicate(), problem.comm
     problem.residual(x, control, out)
     values, n = out.array_r.copy(), problem.n_owned
@@ -168,7 +180,9 @@ def _touching(problem: Any, x: np.ndarray, control: float) -> list[np.ndarray]:
 
 def _status_changes(problem: Any, attempt: Any) -> int | None:
     """Return the number of points whose contact status changed in the last iteration; None without contact.
-    attempt: the last iterate x and control, with their last corrections dx and dcontrol."""
+
+    attempt: the last iterate x and control, with their last corrections dx and dcontrol.
+    """
     if not problem.contact.faces:
         return None
     n, count = problem.n_owned, 0

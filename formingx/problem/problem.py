@@ -63,6 +63,7 @@ class _Stage(NamedTuple):
 
 class Problem:
     """Discrete problem of a scene: its residual F, and the derivatives of F by the unknowns x and by the control.
+
     `formingx.solve.equations` describes the members that the solver calls.
 
     Attributes:
@@ -160,7 +161,9 @@ class Problem:
 
     def set_fields(self, x: np.ndarray, control: float | None = None) -> None:
         """Set the fields of the forms from x, shape (n,), and update the coefficients that depend on them.
-        control: of the forms; None: it stays."""
+
+        control: of the forms; None: it stays.
+        """
         if control is not None:
             self._control[()] = control
         self._fields[: self.n_owned] = x[: self.n_owned]
@@ -171,7 +174,9 @@ class Problem:
 
     def set_state(self, x: PETSc.Vec, control: float) -> np.ndarray:
         """Set the fields and the control of the forms from a vector of unknowns.
-        Return the Lagrange multipliers of the means of boundaries (`ConstrainedMean`), shape (means,), on all ranks."""
+
+        Return the Lagrange multipliers of the means of boundaries (`ConstrainedMean`), shape (means,), on all ranks.
+        """
         values, last = x.array_r, self.comm.size - 1
         self.set_fields(values, control)
         if not last:
@@ -188,7 +193,8 @@ class Problem:
 
         .. math:: \frac{1}{V} \int_V a \cdot b \, dV
 
-        V is the reference volume. Pressures and multipliers do not count."""
+        V is the reference volume. Pressures and multipliers do not count.
+        """
         return self._dot(self._metric * a.array_r[: self.n_owned], b.array_r[: self.n_owned])
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:
@@ -229,7 +235,9 @@ class Problem:
 
     def reaction(self, number: int, x: PETSc.Vec, control: float) -> float:
         """Return the force of the body on driven support `number`, positive along its component; collective.
-        The unit is stress length^2; in plane strain per unit depth, stress length."""
+
+        The unit is stress length^2; in plane strain per unit depth, stress length.
+        """
         left = self.forces(x, control)[self.driven_unknowns(number)].sum()
         forms = self.forms
         return -float(combined(self.comm, left, MPI.SUM)) * forms.stress * forms.volume / forms.length
@@ -246,13 +254,17 @@ class Problem:
 
     def body_forces(self, x: np.ndarray, control: float) -> np.ndarray:
         """Return the internal minus external forces without contact and constraints; dimensionless, shape (n,).
-        In equilibrium supports and tools supply them."""
+
+        In equilibrium supports and tools supply them.
+        """
         self.set_fields(x, control)
         return self.assemble(self._residual)
 
     def _forces(self, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the internal minus external forces, contact included, at the state to which the forms are set.
-        fields: its locally owned field unknowns, shape (n,). The forces are dimensionless, shape (n,)."""
+
+        fields: its locally owned field unknowns, shape (n,). The forces are dimensionless, shape (n,).
+        """
         values = self.assemble(self._residual)
         for contact in self.contact.faces:
             contact.add_residual(values, fields, control)
@@ -270,7 +282,9 @@ class Problem:
 
     def volume_error_away(self, state: Any, places: np.ndarray, distance: float) -> float:
         """Return the volume-weighted root mean square of J - 1 away from places, shape (k, 2), length; collective.
-        Elements with a quadrature point within `distance` are left out."""
+
+        Elements with a quadrature point within `distance` are left out.
+        """
         with self.state_context(state):
             return self.admissible.volume_error_away(places, distance)
 
@@ -305,8 +319,10 @@ class Problem:
     @contextlib.contextmanager
     def state_context(self, state: Any) -> Iterator[Self]:
         """Set the problem to a state inside the context, and restore the previous values at its end.
+
         Step data, history variables, unknowns (`x`, `forms.w`) and control are set. The state has x (locally owned
-        entries), control, time, setting (`StepData` as plain data, or empty) and history_variables."""
+        entries), control, time, setting (`StepData` as plain data, or empty) and history_variables.
+        """
         fields, control, clock = self._fields.copy(), float(self._control), self.forms.clock
         stage, x = self._stage, self.x.array_r.copy()
         variables, predicted = self.history.variables, self.history.predicted
@@ -324,7 +340,9 @@ class Problem:
 
     def restore(self, state: Any) -> None:
         """Restore step data, history variables and process time of an accepted state, to start a step from it.
-        `state` has the attributes of `state_context`."""
+
+        `state` has the attributes of `state_context`.
+        """
         if self.history.path_dependent:
             self.history.variables = state.history_variables
         if state.setting:
@@ -335,7 +353,9 @@ class Problem:
     @property
     def fading_forces(self) -> np.ndarray | None:
         """Unbalanced forces f of changed items, shape (n,), dimensionless, or None.
-        The residual loses (1 - control) f."""
+
+        The residual loses (1 - control) f.
+        """
         return None if self._stage.unbalanced is None else self._stage.unbalanced[: self.n_owned]
 
     def enter(self, setting: StepData, x: np.ndarray, control: float) -> None:
@@ -378,7 +398,9 @@ class Problem:
 
     def update_temperature(self) -> None:
         """Update material constants and friction to a changed temperature; collective.
-        Raise `InputError` if one has no value there."""
+
+        Raise `InputError` if one has no value there.
+        """
         call_on_all_ranks(self.comm, [self.forms.update_temperature,
                                       *(contact.update_temperature for contact in self.contacts)])
 
@@ -502,8 +524,10 @@ class ProblemHistories:
 
     def predict(self, start: Start, x: np.ndarray, control: float) -> list[Any]:
         """Return the history variables of materials and temperature at the end of a step that is not yet accepted.
+
         They are stored, and `advance` uses them if it accepts the same x, shape (n,). The caller must restore the
-        earlier ones."""
+        earlier ones.
+        """
         self._problem.set_fields(x, control)
         for history in self._forms.histories:
             history.advance(x[: self._problem.n_owned], control, start)

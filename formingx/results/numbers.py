@@ -69,7 +69,9 @@ class PartNumbers(KeyNumbers):
 
     def _rows(self, where: str, further: list[tuple[str, str]]) -> list[tuple[str, str]]:
         """Return the rows (name, value with unit) of the printed table, `further` ones before that of the scrap.
-        `where` is the place of the minimum wall."""
+
+        `where` is the place of the minimum wall.
+        """
         rows = [("given for", self.basis)] if self.basis else []
         if self.weight is not None:
             rows += [(self.weight_label, self._with_unit(self.weight, self.units.weight))]

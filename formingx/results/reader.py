@@ -32,31 +32,41 @@ class Reader(Protocol):
 
     def part(self, state: State, density: float | None, trim: object, heights: object, units: Units) -> KeyNumbers:
         """Return the key numbers of the part in a state.
+
         density: g/cm3, or None. trim: radius at which the part is cut off, ("height", h), or None, length; in three
         dimensions z of a plane beyond which the part lies. heights: axial distances from the pole with a wall, length;
-        none in three dimensions."""
+        none in three dimensions.
+        """
 
     def stress(self, state: State, depth: float | None) -> Any:
         """Return the stresses of the body in a state; depth: in a sheet in three dimensions, from 0 to 1, or None."""
 
     def filling(self, contact: FaceContact) -> ColumnTable:
         """Return the remaining gaps between the body and the tool of a contact as a table, one row per state.
-        In a section the columns are the controls, such as the pressure, and the gap in each corner of the tool."""
+
+        In a section the columns are the controls, such as the pressure, and the gap in each corner of the tool.
+        """
 
     def view(self, file: object, state: State, grid: float | None, camera: object) -> None:
         """Draw the body in a state as a PNG file, coloured by its wall over the original thickness.
+
         grid: size of the squares of a grid printed on a flat sheet in three dimensions, length, or None. camera: name
-        of a view, direction from the part to the camera, or None."""
+        of a view, direction from the part to the camera, or None.
+        """
 
     def solid(self, state: State) -> tuple:
         """Return the part in a state as a closed surface of triangles.
+
         Points (x, y, z), shape (n, 3), length; row numbers of corners, shape (m, 3); wall over original thickness at
-        the points, shape (n,)."""
+        the points, shape (n,).
+        """
 
     def report(self, file: object, title: str, failure: object, units: Units, density: float | None,
                trim: object) -> FilePath:
         """Write the report of the run as an HTML file with a title, and return its path.
-        failure: the `ConvergenceError` that ended the run, or None. density: g/cm3, or None. trim: see `part`."""
+
+        failure: the `ConvergenceError` that ended the run, or None. density: g/cm3, or None. trim: see `part`.
+        """
 
 
 class SectionReader:

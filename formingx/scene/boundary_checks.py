@@ -11,7 +11,9 @@ from ..physics.supports import Constrained
 
 def check(scene: Any) -> None:
     """Check that the boundary of each item exists and has an area, and that a load knows its layers.
-    An InputError also reports a load or contact on the axis, and two hinges on one boundary."""
+
+    An InputError also reports a load or contact on the axis, and two hinges on one boundary.
+    """
     mesh, hinged = scene.mesh, set()
     size = mesh.comm.allreduce(np.abs(mesh.domain.geometry.x).max(initial=0.0), MPI.MAX)
     for item in scene.items:

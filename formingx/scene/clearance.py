@@ -14,8 +14,10 @@ from .scene import Scene
 
 def check(scene: Scene, plans: list[Any], travels: dict[int, float] | None = None) -> list[Any]:
     """Check that tools do not overlap in the stages of a process, and that none passes a constrained boundary.
+
     Travels are {number in `Scene.items`: length}, None: all 0. Stages from which on a travel is unknown are returned,
-    to be checked when the run reaches them. A violation is an InputError."""
+    to be checked when the run reaches them. A violation is an InputError.
+    """
     tools = {i: item for i, item in enumerate(scene.items) if isinstance(item, Contact)}
     outlines = {i: _outline(tool) for i, tool in tools.items()}
     travels, unknown = travels or dict.fromkeys(tools, 0.0), []
@@ -55,7 +57,9 @@ def _check_motion(scene: Scene, label: str, tools: dict[int, Contact], outlines:
 
 def _break_points(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, float]]:
     """Yield the travels {number in `Scene.items`: length} at the break points of a stage, or at its end.
-    Between points of its tables they are linear. A travel that is known only in the run is nan."""
+
+    Between points of its tables they are linear. A travel that is known only in the run is nan.
+    """
     if plan.tables:
         for time in sorted({t for _, table in plan.tables for t in table[:, 0]}):
             yield travels | {i: float(np.interp(time, *table.T)) for i, table in plan.tables
@@ -69,8 +73,10 @@ def _break_points(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, fl
 def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
                    travels: dict[int, float]) -> None:
     """Raise an InputError if two active tools overlap at given travels.
+
     `present` are the contacts of the active tools, `outlines` points on the tools without travel and `travels` lengths,
-    each {number in `Scene.items`: value}. `caller` begins the error message."""
+    each {number in `Scene.items`: value}. `caller` begins the error message.
+    """
     near = 1e-6 * max(scene.extent)
     for i, a in present.items():
         for j, b in present.items():
@@ -91,7 +97,9 @@ def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outli
 
 def _outline(contact: Contact, pieces: int = 20) -> np.ndarray:
     """Return points on the profile of a tool without travel, shape (n, 2), length, `pieces` of them on each line.
-    In three dimensions they are at most about 4000 vertices of the surface of the tool, shape (n, 3)."""
+
+    In three dimensions they are at most about 4000 vertices of the surface of the tool, shape (n, 3).
+    """
     points, lines = contact.tool.surface()
     if contact.tool.components == 3:
         return points[:: max(1, len(points) // CURVE_POINTS)]

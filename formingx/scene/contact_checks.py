@@ -18,8 +18,10 @@ OTHER_UNIT = 4.0
 
 def check_start(scene: Any, contact: Contact) -> None:
     """Check that the body starts outside a tool, and that the contact face is its boundary nearest to the tool.
+
     Friction must be known at the temperatures of the face, no controlled pressure may act there, and the points must be
-    dense (`tool_width.check`). A violation is an InputError."""
+    dense (`tool_width.check`). A violation is an InputError.
+    """
     contact.friction_at(None if scene.temperature is None else scene.temperature.at_boundary(contact.on))
     mesh, near = scene.mesh, 1e-6 * max(scene.extent)
     if scene.kinematics.components != contact.tool.components:
@@ -60,7 +62,9 @@ def check_start(scene: Any, contact: Contact) -> None:
 
 def _fits_upside_down(contact: Contact, face: np.ndarray, points: np.ndarray, near: float) -> bool:
     """Return True if the tool, mirrored and moved along Z to touch a face (m, 2), is free of the body (n, 2).
-    `near` is the round-off of a length."""
+
+    `near` is the round-off of a length.
+    """
     tool = contact.tool.mirrored()
     low, high = tool.bounds[:, 1]
     below = tool.moved(z=face[:, 1].min() - high)

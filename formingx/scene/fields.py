@@ -31,7 +31,9 @@ def values_at(field: Any, points: np.ndarray, mesh: Mesh, name: str = "temperatu
 
 def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
     """Return the values of a temperature at n points, shape (n,), equal on all ranks; collective.
-    `field` is as in `Scene`; the points are the same on all ranks, shape (n, 2), length; axes are "RZ" or "xyz"."""
+
+    `field` is as in `Scene`; the points are the same on all ranks, shape (n, 2), length; axes are "RZ" or "xyz".
+    """
     if isinstance(field, type | Mapping | Sequence) and not isinstance(field, str):
         raise InputError(f"{name} = {field!r}: must be {_WHAT.format(*axes)}")
     if isinstance(field, Table):
@@ -55,7 +57,9 @@ def _values(field: Any, points: np.ndarray, name: str, axes: str) -> np.ndarray:
 
 class PointReader:
     """Evaluation of scalar finite element functions at fixed points of a mesh.
-    The reference points have shape (n, 2), length, equal on all ranks. A point outside the mesh is an InputError."""
+
+    The reference points have shape (n, 2), length, equal on all ranks. A point outside the mesh is an InputError.
+    """
 
     def __init__(self, space: Any, points: np.ndarray):
         domain, element = space.mesh, space.element.basix_element
@@ -76,7 +80,9 @@ class PointReader:
 
 def _from_file(file: Any, points: np.ndarray, names: str) -> np.ndarray:
     """Return the temperatures at points, shape (n, 2), by linear interpolation in a CSV file, shape (n,).
-    The file has the column T and one or more coordinates as columns. `names` is "RZ" or "xyz", their names."""
+
+    The file has the column T and one or more coordinates as columns. `names` is "RZ" or "xyz", their names.
+    """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import QhullError
     table = csv_files.read(file)

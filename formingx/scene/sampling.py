@@ -15,8 +15,10 @@ from .temperature import GivenTemperature
 
 def sample(mesh: Mesh, layer: str, degree: int, temperature: GivenTemperature | None = None) -> Sample:
     """Return the quadrature points of a degree in the owned cells of a layer, cell by cell.
+
     In m cells with q points each: positions (m q, 2 or 3), length, cells (m,), places in the reference cell (q, 2),
-    temperatures (m q,) or None."""
+    temperatures (m q,) or None.
+    """
     domain = mesh.domain
     cells = mesh.cells.find(mesh.layers[layer])
     cells = np.sort(cells[cells < len(own_cells(domain))])

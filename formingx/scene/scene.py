@@ -224,7 +224,9 @@ class Scene:
 
     def same_tool(self, number: int) -> list[int]:
         """Return the numbers in `items` of all contacts of the same moving tool, with the same `direction` and name.
-        They are ascending; for an item without `direction` it is its own number."""
+
+        They are ascending; for an item without `direction` it is its own number.
+        """
         item = self.items[number]
         if item.direction is None:
             return [number]
@@ -253,7 +255,9 @@ class Scene:
 
     def number(self, caller: str, item: Any) -> int:
         """Return the number in `items` of a load, support or contact, or of its name; raise `InputError` without it.
-        caller: name of the calling function, for the message."""
+
+        caller: name of the calling function, for the message.
+        """
         for i, own in enumerate(self.items):
             if item is own or isinstance(item, str) and item == own.name:
                 return i
@@ -263,7 +267,9 @@ class Scene:
 
     def column(self, item: Any) -> str:
         """Return the name of the column of a `Path` with the pressure or the travel of an item that can be controlled.
-        It is preceded by the name of the item if several items can be controlled."""
+
+        It is preceded by the name of the item if several items can be controlled.
+        """
         alone = len(self.drivable) == 1 or not item.name
         return item.quantity if alone else f"{item.name}_{item.quantity}"
 
@@ -357,7 +363,9 @@ class Scene:
 
 def _checked_items(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
     """Return an argument as a list; raise an InputError unless all entries are objects of the class `kind`.
-    `name` is the name of the argument, `what` describes its entries in the message."""
+
+    `name` is the name of the argument, `what` describes its entries in the message.
+    """
     scene_items = as_list(f"Scene: {name}", scene_items, what)
     for item in scene_items:
         if not isinstance(item, kind):

@@ -25,7 +25,9 @@ def check_driven(supports: Sequence[Any]) -> None:
 
 def check_held(scene: Any, supports: Sequence[Any], touched: bool = False) -> None:
     """Raise an InputError unless the active supports constrain u_r on the axis and prevent rigid motions of the body.
-    touched: True if a tool may prevent rigid motions; then only the axis is checked."""
+
+    touched: True if a tool may prevent rigid motions; then only the axis is checked.
+    """
     check_axis(scene, supports)
     if not touched:
         check_rigid_body(scene, supports)
@@ -33,7 +35,9 @@ def check_held(scene: Any, supports: Sequence[Any], touched: bool = False) -> No
 
 def check_axis(scene: Any, supports: Sequence[Any]) -> None:
     """Check that an axisymmetric mesh does not cross the axis R = 0, and that a support constrains u_r on it.
-    A violation is an InputError."""
+
+    A violation is an InputError.
+    """
     if not scene.kinematics.axisymmetric:
         return
     geometry = scene.mesh.domain.geometry
@@ -55,12 +59,14 @@ def check_axis(scene: Any, supports: Sequence[Any]) -> None:
 
 def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
     r"""Check that the supports prevent every rigid motion of the body.
+
     Let c_ij be the constrained displacement component of the rigid motion j (`Kinematics.rigid_motions`) at node i of a
     constraint with n nodes. A constrained mean counts as one node. The body is free to move if the matrix
 
     .. math:: G_{jk} = \sum_{\text{constraints}} \frac{1}{n} \sum_{i=1}^{n} c_{ij} c_{ik}
 
-    is singular. A body that can move is an InputError."""
+    is singular. A body that can move is an InputError.
+    """
     names, modes = zip(*scene.kinematics.rigid_motions().items())
     gram = np.zeros((len(modes), len(modes)))
     size = max(scene.extent)
@@ -85,8 +91,10 @@ def check_rigid_body(scene: Any, supports: Sequence[Any]) -> None:
 
 def check_hinges(scene: Any) -> None:
     """Raise an InputError if a layer at a hinge is much softer than another layer at the same rim.
+
     A hinge with weight="area" pulls all layers with one traction, so moduli may differ by a factor of 100. A loaded
-    layer may not be 50 times softer: the pressure would squeeze it out."""
+    layer may not be 50 times softer: the pressure would squeeze it out.
+    """
     moduli = {name: scene.shear_modulus(name) for name in scene.materials}
     for constraint in (constraint for support in scene.supports for constraint in support.constraints()):
         if isinstance(constraint, Constrained):

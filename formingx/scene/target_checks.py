@@ -27,8 +27,10 @@ def check(scene: Scene, targets: Iterable[Any], inactive: Collection[int] | None
 def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = None,
                 continues: bool = False) -> str | None:
     """Return the reason why no run of a scene can reach a target, or None.
+
     A stage leaves out `inactive` items (numbers in `Scene.items`), None for a run of `trace`; a run that `continues`
-    may withdraw a tool."""
+    may withdraw a tool.
+    """
     name, value, driven = target.name, target.value, scene.driven
     active = [item for i, item in enumerate(scene.items) if i not in (inactive or ())]
     moulds = [item for item in active if item in scene.contacts and not item.driven]
@@ -77,7 +79,9 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
 
 def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
     """Return the reason why a "pressure" or "travel" is implausibly large for a scene, or None.
-    It is above 1e9 times the shear modulus, or the extent of the body."""
+
+    It is above 1e9 times the shear modulus, or the extent of the body.
+    """
     if quantity == "pressure":
         what, unit = "the shear modulus", max([scene.shear_modulus(name) for name in scene.mesh.layers])
     elif quantity == "travel":
@@ -100,7 +104,9 @@ def _is_plate(contact: Any) -> bool:
 
 def _meets_flat_sheet_alone(scene: Scene, contact: Any) -> bool:
     """Return True if a tool that moves along Z is the only load of a flat sheet without a hole.
-    The sheet is then free of stress at the beginning, and resists the tool at each travel."""
+
+    The sheet is then free of stress at the beginning, and resists the tool at each travel.
+    """
     tool = scene.same_tool(scene.items.index(contact))
     others = [item for i, item in enumerate(scene.items) if item.driven and i not in tool]
     if scene.loads or others or scene.heat is not None or scene.expansion or scene.state_transfer is not None:
@@ -113,7 +119,9 @@ def _meets_flat_sheet_alone(scene: Scene, contact: Any) -> bool:
 
 def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
     """Return the support that constrains the displacement of a target to a constant, or None.
-    `name` is the name of the target, such as "u_r_at_1_0.5" for u_r at (R, Z) = (1, 0.5)."""
+
+    `name` is the name of the target, such as "u_r_at_1_0.5" for u_r at (R, Z) = (1, 0.5).
+    """
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), SAME_PLACE * max(scene.extent)
     for support in supports:
@@ -128,7 +136,9 @@ def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
 
 def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
     """Return True if the pole of the contact face would lie deeper inside the tool than the body is thick.
-    `height` is the axial displacement of the pole, length. The result is False for a face without a pole."""
+
+    `height` is the axial displacement of the pole, length. The result is False for a face without a pole.
+    """
     nodes = scene.mesh.nodes_of(contact.on)
     pole = nodes[np.argmin(nodes[:, 0])]
     if contact.tool.components == 3 or pole[0] > 1e-9 * max(scene.extent):
@@ -139,8 +149,10 @@ def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
 
 def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
     """Return the volume between a body and its mould by squares of a grid, and an upper bound over it.
+
     The volume, length^3 or length^2, is infinite in an open mould. For a flat body, squares next to the body and
-    outside the tool count."""
+    outside the tool count.
+    """
     from scipy.ndimage import binary_dilation, label
     face = scene.mesh.nodes_of(contact.on)
     if scene.mesh.columns is not None and np.ptp(face[:, 1]) > np.ptp(face[:, 0]):
@@ -168,8 +180,10 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
 
 def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
     """Return the volume between a tube, closed below, and its mould, up to the upper end of the tube, length^3.
+
     It is infinite if the mould is open. The volume that the outer face `line`, (n, 2), length, encloses does not
-    count."""
+    count.
+    """
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]
     (r, top), (low, width) = line[-1], (contact.tool.bounds[0, 1], contact.tool.bounds[1, 0])

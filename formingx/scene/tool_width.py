@@ -21,7 +21,9 @@ _MAX_MOVES = 200
 
 def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
     """Raise an InputError if the contact points of a face are too sparse to detect a tool.
-    It could pass between two, or cut more than 10 % (`CUT`) of the thickness before it meets one."""
+
+    It could pass between two, or cut more than 10 % (`CUT`) of the thickness before it meets one.
+    """
     ends = gathered(mesh.comm, facet_node_positions(mesh.domain, mesh.facets_of(contact.on))[:, :2])
     if contact.tool.closed:
         _check_width(contact, ends, axisymmetric)
@@ -30,7 +32,9 @@ def check(mesh: Any, contact: Contact, axisymmetric: bool) -> None:
 
 def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None:
     """Raise an InputError if a closed tool is narrower than the distance of the contact points nearest to it.
-    `ends` are the end points of the element edges of the face, shape (n, 2, 2), length."""
+
+    `ends` are the end points of the element edges of the face, shape (n, 2, 2), length.
+    """
     from scipy.spatial import ConvexHull
     outline = contact.tool.surface()[0]
     if axisymmetric and outline[:, 0].min() <= 1e-9 * contact.tool.size:         # its other half
@@ -48,8 +52,10 @@ def _check_width(contact: Contact, ends: np.ndarray, axisymmetric: bool) -> None
 
 def _check_first_touch(contact: Contact, ends: np.ndarray, thickness: float) -> None:
     """Raise an InputError if a tool would cut more than `CUT` of the thickness before it meets a contact point.
+
     It moves by its distance from the nearest point (sphere tracing), so it passes none; without a direction it moves
-    along its normal. Edges of the face have ends (n, 2, 2), length."""
+    along its normal. Edges of the face have ends (n, 2, 2), length.
+    """
     tool = contact.tool
     near = tool.nearest(ends.mean(1))
     way = -near.normal[np.argmax(near.distance)]

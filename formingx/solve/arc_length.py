@@ -277,9 +277,11 @@ class Curve:
     def step(self, old: State, length: float, predictor: Predictor | None = None, earlier: State | None = None,
              bend: Bend | None = None, equation: Constraint | None = None) -> State:
         """Return the state at an arc length from `old` (Song 1993, eqs. 4.14 to 4.31); raise `Failure` without one.
+
         It lies in the plane normal to the tangent, or where `equation` holds, such as "quantity = target". `earlier`
         bends the guess to a parabola, and `bend` adds (dx, shape (n,); dcontrol). Away from limit points the predictor
-        replaces the guess of x."""
+        replaces the guess of x.
+        """
         x, control = old.x + length * old.direction, old.control + length * old.slope
         end = equation or self._plane(old, x, control)
         if earlier is not None:
@@ -329,7 +331,9 @@ class Curve:
 
     def state_at_fraction(self, a: State, b: State, fraction: float) -> State:
         """Return the state in the plane normal to the tangent of `a`, at a fraction (0 to 1) of the Hermite cubic.
-        Raise `Failure` if Newton's method fails, or if an element is inverted."""
+
+        Raise `Failure` if Newton's method fails, or if an element is inverted.
+        """
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 

@@ -435,13 +435,17 @@ class _Points(FacePoints):
 
     def _moved(self, dx: Array, step: Array | float) -> Array:
         """Return the motions of the m points by dx, shape (n,) or (n, k), and step; collective.
-        They are relative to the tools, shape (m c,) or (m c, k), length."""
+
+        They are relative to the tools, shape (m c,) or (m c, k), length.
+        """
         motions = np.concatenate([face.relative_motion(dx, step) for face in self._faces])
         return self.values_at(motions).reshape(-1, *dx.shape[1:])
 
     def _motions(self, y: Array) -> list[Array]:
         """Return the motions of the p owned points of each face, shape (p, c), 0 for points that are not chosen.
-        y: motions of the m points, shape (m c,), length."""
+
+        y: motions of the m points, shape (m c,), length.
+        """
         motions = np.zeros((self.starts[-1], self._c))
         self.spread(y.reshape(-1, self._c), motions)
         return self.of_faces(motions)

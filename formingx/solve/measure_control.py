@@ -222,8 +222,7 @@ class QuantityRun(Run):
 
 
 def _rate(states: Sequence[State]) -> float:
-    """Return the time derivative of the control at the last of two or three states, from the polynomial through
-    them."""
+    """Return the time derivative of the control at the last of two or three states, by a polynomial through them."""
     t = np.array([state.time - states[-1].time for state in states])
     return float(np.polynomial.Polynomial(np.polynomial.polynomial.polyfit(
         t, [state.control for state in states], len(t) - 1)).deriv()(0.0))

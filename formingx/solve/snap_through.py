@@ -93,7 +93,9 @@ class SnapThrough:
 
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
         """Return the arc lengths of steps at which a snap-through is tried after two failures.
-        If all contacts with friction stick, it is the smallest alone."""
+
+        If all contacts with friction stick, it is the smallest alone.
+        """
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
     def retry_fraction(self, iterations: int) -> float:
@@ -249,7 +251,9 @@ class _Motion:
 
     def _add_dissipation(self, a: Array, x: Array, pull: Array) -> None:
         """Add the work of viscous forces from a to x, shape (n,), to `dissipated`, by the trapezoidal rule.
-        Negative work of the force at the start is left out; `pull`: forces at the end, shape (n,)."""
+
+        Negative work of the force at the start is left out; `pull`: forces at the end, shape (n,).
+        """
         dx = x - a
         self.dissipated += 0.5 * (max(self._sum(self._pull * dx), 0.0) + self._sum(pull * dx))
 
@@ -346,7 +350,9 @@ class JumpRules:
     @property
     def tried_early(self) -> bool:
         """True if a snap-through is tried after two failed steps, False if only after the smallest step has failed.
-        False for a pressure with history variables, since slip in the viscous motion changes the final state."""
+
+        False for a pressure with history variables, since slip in the viscous motion changes the final state.
+        """
         return self.rule in ("snap_through", *["continue_volume"] * (not self._problem.history.path_dependent))
 
     def found_no_equilibrium_near(self, old: State) -> bool:

@@ -66,7 +66,9 @@ class StepControl:
 
     def accepted(self, iterations: int, error: float = 0.0) -> None:
         """Adapt the step length after a converged step of full length (Song 1993, eq. 4.21).
-        `error`: time integration error of the step over its tolerance."""
+
+        `error`: time integration error of the step over its tolerance.
+        """
         factor = min(max(self.target / max(iterations, 1), 0.5), self.growth)
         factor = min(factor, 0.9 * max(error, 1e-9) ** (-1 / 3))
         self.length = min(self.length * factor, self.largest)

@@ -16,8 +16,10 @@ _MIN_TOLERANCE = 1e-7  # smallest tolerance over the size of a curve
 def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tolerance: float,
                name: str) -> list[Line | Arc]:
     """Return successive arcs and lines that approximate a curve, with equal tangents at their joints.
+
     The curve maps parameters from 0 to 1, (n,), to points and derivatives, (n, 2) each; `tolerance` is the largest
-    distance, length. A kink or a small tolerance is an InputError."""
+    distance, length. A kink or a small tolerance is an InputError.
+    """
     size = float(np.ptp(curve(np.linspace(0, 1, 17))[0], axis=0).max())
     if tolerance < _MIN_TOLERANCE * size:
         raise InputError(f"{name}: tolerance = {tolerance:g}: must be at least {_MIN_TOLERANCE:g} of the curve's size,"
@@ -45,7 +47,9 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
 
 def in_plane(points: np.ndarray, name: str) -> np.ndarray:
     """Return the coordinates (x, y), shape (n, 2), of points (n, 3) in the plane z = 0, length.
-    A point outside the plane is an InputError, which begins with `name`."""
+
+    A point outside the plane is an InputError, which begins with `name`.
+    """
     points = np.asarray(points, dtype=float).reshape(-1, 3)
     outside = ~(np.abs(points[:, 2]) <= 1e-9 * max(np.abs(points[:, :2]).max(initial=0.0), 1e-300))
     if np.any(outside):
@@ -57,7 +61,9 @@ def in_plane(points: np.ndarray, name: str) -> np.ndarray:
 
 def piece_through(points: np.ndarray, name: str) -> Line | Arc:
     """Return the line or the circular arc through points (R, Z) in their order, shape (n, 2), length.
-    Points on neither, in another order, or fewer than four of an arc, are an InputError."""
+
+    Points on neither, in another order, or fewer than four of an arc, are an InputError.
+    """
     if not np.all(np.isfinite(points)):
         raise InputError(f"{name}: its coordinates are not all finite numbers")
     n, tolerance = len(points), _MIN_TOLERANCE * max(np.ptp(points, axis=0).max(initial=0.0), 1e-300)
@@ -81,7 +87,9 @@ def piece_through(points: np.ndarray, name: str) -> Line | Arc:
 
 def _biarc(p: np.ndarray, t: np.ndarray, q: np.ndarray, s: np.ndarray) -> list[Line | Arc]:
     """Return two tangent arcs from p with the unit tangent t to q with the unit tangent s; [] if there are none.
-    The joint is the midpoint of the control points p + d t and q - d s."""
+
+    The joint is the midpoint of the control points p + d t and q - d s.
+    """
     v, tangents = q - p, t + s
     a, b, c = 2 * (1 - t @ s), 2 * (v @ tangents), v @ v
     if a > 1e-12:

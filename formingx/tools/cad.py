@@ -26,8 +26,10 @@ _BYTES_PER_SECOND = 50_000  # size of a file that adds one second, bytes
 
 def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
     """Return {number of a curve: function that returns its lines and arcs} of a "step" or "brep" file.
+
     `tolerance` is the distance of arcs that replace a spline or an ellipse; None forbids it. The function raises an
-    InputError outside the plane or without a tolerance."""
+    InputError outside the plane or without a tolerance.
+    """
     if kind == "step":
         _check_references(file)
     with _Reader(file, kind) as reader:
@@ -37,7 +39,9 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
 
 class _Reader:
     """Reader of one "step" or "brep" file in a separate process, which ends with the `with` block.
-    bounds: {number of a curve: [lowest, highest value of its curve parameter]}."""
+
+    bounds: {number of a curve: [lowest, highest value of its curve parameter]}.
+    """
 
     def __init__(self, file: str, kind: str):
         self._file, self._seconds = file, _BASE_SECONDS + os.path.getsize(file) // _BYTES_PER_SECOND
@@ -68,7 +72,9 @@ class _Reader:
 
     def _answer(self, question: Any = None) -> Any:
         """Send a question to the separate process, if it is not None, and return its next line of output, as JSON data.
-        An error, a crash or a timeout of the process is an InputError."""
+
+        An error, a crash or a timeout of the process is an InputError.
+        """
         process, line = self._process, ""
         assert process.stdin is not None and process.stdout is not None
         try:
@@ -92,8 +98,10 @@ class _Reader:
 def _of_curve(evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], bounds: list[float],
               tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
     """Return a function that returns the lines and arcs of a curve, or raises the error of their computation.
+
     `evaluate` maps parameters (n,) within `bounds` to points and derivatives, (n, 3) each. Without a tolerance the
-    curve must be a line or an arc."""
+    curve must be a line or an arc.
+    """
     low, high = bounds
 
     def curve(t):
@@ -118,7 +126,9 @@ def _raise(error: InputError) -> list[Line | Arc]:
 
 def _check_references(file: str) -> None:
     """Raise an InputError unless a STEP file has its end, and defines every referenced item once.
-    The reader would leave out such parts without an error."""
+
+    The reader would leave out such parts without an error.
+    """
     text = re.sub(r"'[^']*'|/\*.*?\*/", "", Path(file).read_bytes().decode("latin-1"), flags=re.DOTALL)
     if "END-ISO-10303-21" not in text:
         raise InputError(f"tool file {file!r} cannot be read: it has no end: it was cut off")

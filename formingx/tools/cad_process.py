@@ -14,8 +14,10 @@ import sys
 
 def main(file: str, kind: str, seconds: int) -> None:
     """Read the file, print its curves, then answer requests for points of the curves, until standard input ends.
+
     A request is a JSON line [curve, [parameters]], its answer [coordinates, derivatives]. The system ends the process
-    after `seconds` of processor time."""
+    after `seconds` of processor time.
+    """
     resource.setrlimit(resource.RLIMIT_CPU, (seconds, seconds))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     out = os.fdopen(os.dup(1), "w", buffering=1)

@@ -17,8 +17,10 @@ from .pieces import TURN, Arc, Line
 
 def curves(file: str | os.PathLike, tolerance: float | None) -> dict[int, Callable[[], list[Line | Arc]]]:
     """Return {number from 1: function that returns its lines and arcs} of the curves in the model space of a drawing.
+
     Texts, dimensions, hatches, points and invisible entities are skipped. The function raises an InputError outside the
-    plane or, for splines and ellipses, without a tolerance; so does a missing ezdxf or unreadable file."""
+    plane or, for splines and ellipses, without a tolerance; so does a missing ezdxf or unreadable file.
+    """
     try:
         import ezdxf
     except ImportError as error:
@@ -47,8 +49,10 @@ def _check_counts(expected: Counter, found: Counter) -> None:
 
 def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return the lines and arcs of a curve of ezdxf.
+
     A damaged or unsupported curve is an InputError with its name; without `tolerance`, length, so are splines and
-    ellipses."""
+    ellipses.
+    """
     try:
         return _read(entity, tolerance, name)
     except InputError:
@@ -59,7 +63,9 @@ def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
 def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return the lines and arcs of a DXF entity, made by the function for its kind.
-    An unsupported kind, or a curve in another plane, is an InputError."""
+
+    An unsupported kind, or a curve in another plane, is an InputError.
+    """
     kind = entity.dxftype()
     if kind in _SKIPPED:
         raise InputError(f"{name} is a {kind}, which is no curve of a section: draw it as lines, arcs, polylines or"
@@ -87,8 +93,10 @@ def _circle(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
 def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return the lines and arcs of a DXF polyline; `name` begins error messages, `tolerance` is not used.
+
     A bulge is the tangent of a quarter of the angle of the arc that follows, negative if clockwise. Three-dimensional,
-    mesh or spline polylines are an InputError."""
+    mesh or spline polylines are an InputError.
+    """
     if entity.dxftype() == "POLYLINE" and not entity.is_2d_polyline:
         raise InputError(f"{name} is a three-dimensional polyline or a mesh: draw it as a plane polyline")
     if entity.dxftype() == "POLYLINE":
@@ -116,7 +124,9 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
 
 def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return arcs along a DXF ellipse; their largest distance from it is `tolerance`, length.
-    No tolerance, or a ratio of axes not between 0 and 1, is an InputError."""
+
+    No tolerance, or a ratio of axes not between 0 and 1, is an InputError.
+    """
     _in_plane(entity.dxf.center, name), _in_plane(entity.dxf.major_axis, name)
     if not 0 < entity.dxf.ratio <= 1:
         raise InputError(f"{name}: its axes have the ratio {entity.dxf.ratio:g}: must be above 0, at most 1")
@@ -132,7 +142,9 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return arcs along the smooth parts of a DXF spline between its knots, up to a distance, length.
-    No tolerance, or a point outside the plane, is an InputError."""
+
+    No tolerance, or a point outside the plane, is an InputError.
+    """
     for point in (*entity.control_points, *entity.fit_points):
         _in_plane(point, name)
     tool = entity.construction_tool()
@@ -161,7 +173,9 @@ def _is_visible(entity: Any, drawing: Any) -> bool:
 
 def unit(file: str) -> str | None:
     """Return the name of the unit of length that a DXF file states ($INSUNITS), or None.
-    An unreadable file, or another unit, is an InputError."""
+
+    An unreadable file, or another unit, is an InputError.
+    """
     import ezdxf
     try:
         code = ezdxf.readfile(file).header.get("$INSUNITS", 0)

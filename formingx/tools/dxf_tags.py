@@ -24,7 +24,9 @@ _LETTERING = ("ACAD_PROXY_ENTITY", "ACAD_TABLE", "ARC_DIMENSION", "ATTDEF", "ATT
 
 def check(file: str, others: tuple[str, ...]) -> Counter:
     """Check that every curve of a drawing has all its data, and return {kind, such as "LINE": number of curves}.
-    `others` are kinds that are not examined. A damaged drawing or an unknown kind is a ValueError with the line."""
+
+    `others` are kinds that are not examined. A damaged drawing or an unknown kind is a ValueError with the line.
+    """
     data = Path(file).read_bytes()
     if data.startswith(b"AutoCAD Binary DXF"):
         raise ValueError("it is binary: save it as text")
@@ -60,7 +62,9 @@ def check(file: str, others: tuple[str, ...]) -> Counter:
 
 def _check_entity(kind: str, tags: list[tuple[int, str]], line: int, others: tuple[str, ...]) -> None:
     """Raise a ValueError with the line if an entity has an unknown kind, or a tag is missing or occurs twice.
-    Tags are (group code, value); `others` are kinds that are not examined."""
+
+    Tags are (group code, value); `others` are kinds that are not examined.
+    """
     where = f"the {kind} that ends before line {line + 1}"
     if kind not in _NEEDED:
         if kind not in _LETTERING and kind not in others:

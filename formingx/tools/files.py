@@ -88,7 +88,9 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
 
 def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
     """Return the tool, or the tool with its solid on the other side, so that a point or mesh lies outside.
-    A body on both sides of the profile is an InputError."""
+
+    A body on both sides of the profile is an InputError.
+    """
     if hasattr(body, "nodes_of"):
         points = np.concatenate([body.nodes_of(name) for name in body.boundaries])
     else:
@@ -112,8 +114,10 @@ def _directed(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
 
 def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | Arc], bool]:
     """Return the pieces of all curves in order along the profile, and True if the profile is closed.
+
     An open profile begins at a free end; curves are reversed where necessary. Curves that form no line are an
-    InputError."""
+    InputError.
+    """
     from scipy.spatial import cKDTree
     curves = [pieces for pieces in curves if pieces]
     if not curves:
@@ -157,7 +161,9 @@ def _tag(tag: Any) -> int:
 
 def _factor(units: Any, kind: str, file: str) -> float:
     """Return the factor by which the lengths of a file are multiplied.
-    An unknown unit, or none in the file, is an InputError."""
+
+    An unknown unit, or none in the file, is an InputError.
+    """
     units = units.length if isinstance(units, Units) else units
     if not isinstance(units, str):
         return positive("tools.read: units (of length, or a factor)", units)
@@ -176,7 +182,9 @@ def _scaled(piece: Line | Arc, factor: float) -> Line | Arc:
 
 def _geo_curves(file: str) -> _Curves:
     """Return {number of a curve: function that returns its line or arc in a list} for a .geo file.
-    The function raises an InputError for other curves."""
+
+    The function raises an InputError for other curves.
+    """
     def pieces(tag: int, piece: Line | Arc | str) -> list[Line | Arc]:
         if isinstance(piece, str):
             raise InputError(f"tool file {file!r}: curve {tag} is a {piece}, which is read from no .geo file: export it"
@@ -187,7 +195,9 @@ def _geo_curves(file: str) -> _Curves:
 
 def _mesh_curves(file: str) -> _Curves:
     """Return {number of a curve: function that returns the line or arc through its nodes, in a list} for a .msh file.
-    The function raises an InputError if the nodes lie on no line or circle, or the elements are not in order."""
+
+    The function raises an InputError if the nodes lie on no line or circle, or the elements are not in order.
+    """
     found = msh.content(file)
     points = dict(zip(map(int, found.numbers), found.points))
     lines: dict[int, list[tuple[int, int]]] = {}

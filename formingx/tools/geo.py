@@ -36,7 +36,9 @@ _ALLOWED = ("points, lines, circles, loops, surfaces, physical groups, mesh size
 
 def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
     """Return {number of a curve: line, arc, or kind of another curve, such as "Spline"} of a .geo file.
-    An unreadable file, or an unsupported statement, is an InputError with the line."""
+
+    An unreadable file, or an unsupported statement, is an InputError with the line.
+    """
     file = os.fspath(file)
     try:
         with open(file, encoding="utf-8") as stream:
@@ -70,7 +72,9 @@ class _Drawing:
 
     def add(self, statement: str) -> None:
         """Add the point, curve or named number that one statement of the gmsh script defines.
-        An unsupported statement is a ValueError."""
+
+        An unsupported statement is a ValueError.
+        """
         if entity := _ENTITY.fullmatch(statement):
             kind, tag, numbers = entity[1], self._number(entity[2]), [self._number(n) for n in entity[3].split(",")]
             if kind in ("Point", "Line", "Circle"):
@@ -87,7 +91,9 @@ class _Drawing:
 
     def _add_point(self, tag: int, numbers: list[float]) -> None:
         """Add point `tag` at (x, y, 0[, mesh size]), length.
-        A point outside the plane, or with a used number, is a ValueError."""
+
+        A point outside the plane, or with a used number, is a ValueError.
+        """
         if len(numbers) not in (3, 4) or numbers[2] != 0 or not all(map(math.isfinite, numbers)):
             raise ValueError("a point must be {x, y, 0} or {x, y, 0, mesh size}, finite numbers")
         if tag in self.points:
@@ -102,8 +108,10 @@ class _Drawing:
 
     def _add_circle(self, tag: int, numbers: list[float]) -> None:
         """Add the circular arc `tag`.
+
         Below 180 degrees it has the numbers of first end, centre and last end; any arc may have (x, y, 0, radius[,
-        first, last angle]), length and radians. Other numbers are a ValueError."""
+        first, last angle]), length and radians. Other numbers are a ValueError.
+        """
         if len(numbers) == 3:
             first, centre, last = (self._point(n) for n in numbers)
             (a, begin), (b, end) = ((math.dist(p, centre), math.atan2(*(p - centre)[::-1])) for p in (first, last))
@@ -141,7 +149,9 @@ class _Drawing:
 
     def _number(self, text: str) -> float:
         """Return the value of an expression of numbers, names, functions and + - * / ^.
-        Anything else is a ValueError."""
+
+        Anything else is a ValueError.
+        """
         words = re.findall(r"(?<![\w.])[0-9.][\w.]*", text)            # Python takes 1_0, 0x10 and 1j for numbers
         if len(text) > 1000 or "**" in text or not re.fullmatch(r"[\w\s.+\-*/^()]*", text, re.ASCII) or not all(
                 is_number(word.removesuffix("e").removesuffix("E")) for word in words):
@@ -150,7 +160,9 @@ class _Drawing:
 
     def _value(self, node: ast.expr) -> float:
         """Return the value of a node of the syntax tree of an expression.
-        A node that is not a number, a known name or an operation is a ValueError."""
+
+        A node that is not a number, a known name or an operation is a ValueError.
+        """
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
             return float(node.value)
         if isinstance(node, ast.Name) and node.id in self.values:

@@ -82,8 +82,10 @@ class Arc(NamedTuple):
 
 def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) -> list[Line | Arc]:
     """Return the lines and tangent arcs of a polyline (n, 2), length, with a fillet radius for each corner.
+
     `closed` joins the last corner to the first; `each` refuses a fillet at a straight point. A fillet without corner or
-    too large is an InputError."""
+    too large is an InputError.
+    """
     n, size = len(points), float(np.ptp(points, axis=0).max())
     edges = [(i, (i + 1) % n) for i in range(n if closed else n - 1)]
     lengths = {e: math.dist(points[e[0]], points[e[1]]) for e in edges}
@@ -126,8 +128,10 @@ def rounded(points: np.ndarray, radii: list[float], closed: bool, each: bool) ->
 def with_polyline(pieces: tuple[Line | Arc, ...], points: np.ndarray, radii: list[float], size: float
                   ) -> list[Line | Arc]:
     """Return a profile whose part between two places is replaced by a polyline with fillets (`Tool.with_piece`).
+
     `points`, shape (n, 2), and `radii` are corners (R, Z) and fillets of the polyline, `size` is the size of the
-    profile; lengths."""
+    profile; lengths.
+    """
     first, last = (_places(pieces, point, size) for point in (points[0], points[-1]))
     if first[0] > last[0]:
         points, radii, first, last = points[::-1], radii[::-1], last, first
@@ -144,7 +148,9 @@ def with_polyline(pieces: tuple[Line | Arc, ...], points: np.ndarray, radii: lis
 
 def _places(pieces: tuple[Line | Arc, ...], point: np.ndarray, size: float) -> list[tuple[int, float]]:
     """Return number and arc length of the lines of a profile on which a point lies.
-    A point on R = 0 stands for an end of the profile on R = 0, with the arc length -inf or inf."""
+
+    A point on R = 0 stands for an end of the profile on R = 0, with the arc length -inf or inf.
+    """
     if abs(point[0]) <= _ON_PROFILE * size:
         ends = [(math.dist(end, point), place) for end, place in (
             (pieces[0].ends[0], (0, -math.inf)), (pieces[-1].ends[1], (len(pieces) - 1, math.inf)))
@@ -170,8 +176,10 @@ def _places(pieces: tuple[Line | Arc, ...], point: np.ndarray, size: float) -> l
 def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn: float, first: bool,
             second: bool) -> Arc:
     """Return the arc that rounds a corner, (2,), between two edges, each shortened by `cut`, length.
+
     Angles are in radians, the turn positive to the left. At an end on the axis one edge is the mirror image, and half
-    of the arc is returned."""
+    of the arc is returned.
+    """
     side = math.copysign(1.0, turn)
     start = corner - cut * np.array([math.cos(incoming), math.sin(incoming)])
     centre = start + side * radius * np.array([-math.sin(incoming), math.cos(incoming)])
@@ -181,7 +189,9 @@ def _fillet(corner: np.ndarray, radius: float, cut: float, incoming: float, turn
 
 def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[float]) -> None:
     """Raise an InputError if two fillets are together longer than their edge.
-    Corners have shape (n, 2); `cut` is the length by which a fillet shortens its edges."""
+
+    Corners have shape (n, 2); `cut` is the length by which a fillet shortens its edges.
+    """
     for (i, j), length in lengths.items():
         if cut[i] + cut[j] > length * (1 + ROUND_OFF):
             k = i if cut[i] >= cut[j] else j
@@ -194,7 +204,9 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
 
 def checked(piece: Line | Arc, i: int) -> Line | Arc:
     """Return a piece of a profile with its numbers as floats; i: its number, for messages.
-    A piece that is no line or arc, not finite, or of length 0 is an InputError."""
+
+    A piece that is no line or arc, not finite, or of length 0 is an InputError.
+    """
     caller = f"Tool: piece {i}"
     if isinstance(piece, Line):
         a, b = (np.array(pair(f"{caller}: an end", p)) for p in piece)

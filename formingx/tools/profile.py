@@ -122,7 +122,9 @@ class Tool:
 
     def _set_pieces(self, pieces: list[Line | Arc], closed: bool) -> None:
         """Store the lines and arcs of the profile, `closed` if the last point is the first.
-        No piece, a gap, a reversal or a crossing of the profile is an InputError."""
+
+        No piece, a gap, a reversal or a crossing of the profile is an InputError.
+        """
         pieces = [checked(piece, i) for i, piece in enumerate(pieces)]
         if not pieces:
             raise InputError("Tool: a profile needs at least one piece, a Line or an Arc")
@@ -273,8 +275,10 @@ class Tool:
 
     def _tabulate(self) -> None:
         """Set `table`, shape (pieces, 9), from `pieces`: the lines, then arcs and sharp corners (arcs of radius 0).
+
         End pieces of an open profile are extended: lines without end, arcs by 90 degrees. Set `lines`, the number of
-        lines, too."""
+        lines, too.
+        """
         rows, arcs = [], []     # origin, direction, sense (0: line), lowest and highest coordinate; arcs: radius, start
         tol = ROUND_OFF * self.size
         ends = self._ends()
@@ -300,7 +304,9 @@ class Tool:
 
     def _ends(self) -> tuple:
         """Return (point (R, Z), angle) of the corner with the mirror image at the axis for both ends, or None each.
-        The direction turns by this angle, positive to the left, radians; a closed profile has 0, no corner."""
+
+        The direction turns by this angle, positive to the left, radians; a closed profile has 0, no corner.
+        """
         if self.closed:
             return (np.zeros(2), 0.0), (np.zeros(2), 0.0)
         found = []

@@ -9,8 +9,10 @@ from .profile import Nearest
 
 class RigidTool(Protocol):
     """Rigid tool at a travel of 0, such as a `Tool` or a `SolidTool`.
+
     It moves as a rigid body, so the coordinates of points are relative to it. Distances must be exact near the surface:
-    contact multiplies their errors by a penalty of 1e5 times the stiffness of the body."""
+    contact multiplies their errors by a penalty of 1e5 times the stiffness of the body.
+    """
 
     def signed_distance(self, x: np.ndarray) -> np.ndarray:
         """Return the signed distance of points from the surface of the tool.
@@ -27,7 +29,8 @@ class RigidTool(Protocol):
 
         Returns:
             Points, shape (n, components), length. Point numbers of the pieces: lines, shape (m, 2), or in three
-            dimensions triangles, shape (m, 3)."""
+            dimensions triangles, shape (m, 3).
+        """
 
     @property
     def bounds(self) -> np.ndarray:

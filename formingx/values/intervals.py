@@ -11,12 +11,14 @@ UNDETERMINED = 0.5
 def t_intervals(constants: Mapping[str, float], errors: Mapping[str, float], points: int, confidence: float
                 ) -> dict[str, tuple[float, float]]:
     r"""Return confidence intervals of the constants of a least-squares fit.
+
     With the fitted value c of a constant, its standard error s, n measured points and m constants, the ends are
 
     .. math:: c \pm t_{n-m} \, s
 
     Here t is the quantile of Student's t distribution with n - m degrees of freedom, at least one. The result is
-    {constant: (lower end, upper end)}. A confidence level outside (0, 1) is an InputError."""
+    {constant: (lower end, upper end)}. A confidence level outside (0, 1) is an InputError.
+    """
     from scipy.stats import t
     width = t.ppf((1 + fraction("intervals: confidence", confidence)) / 2, max(points - len(constants), 1))
     return {name: (value - width * errors[name], value + width * errors[name]) for name, value in constants.items()}

@@ -75,7 +75,9 @@ def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | Non
 
 def _adapted_sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
     """Return a new mesh of a flat sheet with triangles of given sizes, shape (n,), at points (n, 2), length.
-    Sizes are linear between points. A mesh that is no `sheet`, or whose nodes were moved, is an InputError."""
+
+    Sizes are linear between points. A mesh that is no `sheet`, or whose nodes were moved, is an InputError.
+    """
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import cKDTree
     if mesh.of_size is None:
@@ -91,7 +93,9 @@ def _adapted_sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
 
 def checked_columns(mesh: Mesh) -> Columns:
     """Return the columns of elements along the sheet of a mesh.
-    A mesh without columns, or whose nodes were moved, is an InputError."""
+
+    A mesh without columns, or whose nodes were moved, is an InputError.
+    """
     columns = mesh.columns
     if columns is None:
         raise InputError("adapted: must be a mesh made by disc, sphere, parison or from_lines, or, in three dimensions,"
@@ -105,8 +109,10 @@ def checked_columns(mesh: Mesh) -> Columns:
 
 def _new_ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     """Return coordinates of the ends of k new columns along the sheet, such as radii of a disc, shape (k + 1,).
+
     The n columns become longer by `factors`, shape (n,); inf is the longest column. Too many new columns are an
-    InputError."""
+    InputError.
+    """
     old = columns.ends
     fractions = np.arange(_COLUMN_SAMPLES) / _COLUMN_SAMPLES
     samples = np.append((old[:-1, None] + np.diff(old)[:, None] * fractions).ravel(), old[-1])

@@ -22,10 +22,12 @@ _STRESS_ORDER = 2
 
 
 def column_factors(path: Any, max_rotation: float | None, error: float | None) -> np.ndarray:
-    """Return the factors by which the n columns of a mesh should become longer, shape (n,); inf where no state demands
-    one. A column has the elements between two cross-sections; its factor is the smallest over the states of the run.
-    The sheet turns along it by at most `max_rotation`, radians, with at most this times a fillet radius as length.
-    `error`: allowed relative error of the stress, as norms over the body. None: ignored."""
+    """Return the factors by which n columns of a mesh should become longer, shape (n,); inf where no state demands one.
+
+    A column has the elements between two cross-sections; its factor is the smallest over the states of the run. The
+    sheet turns along it by at most `max_rotation`, radians, with at most this times a fillet radius as length. `error`:
+    allowed relative error of the stress, as norms over the body. None: ignored.
+    """
     section_only(path.scene, "column_factors", "use fx.mesh.adapted")
     max_rotation, error = (value if value is None else positive(f"column_factors: {name}", value)
                     for name, value in (("max_rotation", max_rotation), ("error", error)))
@@ -50,8 +52,10 @@ def _nearest_column(points: np.ndarray, middles: np.ndarray) -> np.ndarray:
 
 def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) -> np.ndarray:
     """Return the required over the present length of the n columns of elements for a limit of rotation, shape (n,).
+
     The limit, in radians, holds for the angle along a column, and on a fillet also for its length over the radius.
-    Middles of the columns have shape (rows of nodes, n, 2), length."""
+    Middles of the columns have shape (rows of nodes, n, 2), length.
+    """
     found = np.full(middles.shape[1], np.inf)
     problem = path.problem
     columns, outline = problem.scene.mesh.columns, Outline(problem.forms)
@@ -87,8 +91,10 @@ def _factors_by_rotation(path: Any, max_rotation: float, middles: np.ndarray) ->
 
 def _rotations(edges: np.ndarray, sides: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """Return the angle by which the sheet turns along each of n columns, radians, at most 1, shape (n,).
+
     Edges have shape (m, 3, 2). A jump between two columns counts half in each. Each of the two `sides` has rows of
-    edges and masks of those that end at the column's end, (n,)."""
+    edges and masks of those that end at the column's end, (n,).
+    """
     tangent = np.zeros(edges.shape[-1])                      # at both ends of each column, averaged over both faces
     for numbers, reversed_edges in sides:
         a, b, m = edges[numbers].transpose(1, 0, 2)
@@ -109,7 +115,8 @@ def _factors_by_stress_error(path: Any, error: float, middles: np.ndarray) -> np
     C h^p is the error of the stress sigma in a column of elements of length h. The order is p = 2, and the run gives
     the constant C of each column. s is the length along the sheet. The smallest ratio of h to the present length over
     the examined states is returned. `error` is epsilon; middles of the columns have shape (rows of nodes, n, 2),
-    length."""
+    length.
+    """
     n = middles.shape[1]
     length = np.linalg.norm(np.diff(path.problem.scene.mesh.columns.place(
         path.problem.scene.mesh.columns.ends)[[0, -1]], axis=1), axis=2).mean(0)

@@ -16,8 +16,10 @@ _MIN_SIZE_RATIO = 0.25
 
 def required_sizes(path: Any, max_rotation: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
     """Return positions of the nodes of the flat sheet, shape (n, 2), and the required sizes, shape (n,), length.
+
     Each limit reduces the size in each state, None does not: rotation (radians) and relative wall change between
-    neighbouring triangles."""
+    neighbouring triangles.
+    """
     factor: np.ndarray = np.ones(0)
     for state in path.states:
         wall = path.wall(state)
@@ -42,7 +44,9 @@ def required_sizes(path: Any, max_rotation: float | None, error: float | None) -
 
 def _neighbours(triangles: np.ndarray) -> np.ndarray:
     """Return the numbers of each pair of triangles with a common edge, shape (k, 2).
-    triangles: node numbers, shape (m, 3)."""
+
+    triangles: node numbers, shape (m, 3).
+    """
     numbers = edges_of(triangles)[2]
     triangle = np.tile(np.arange(len(triangles)), 3)
     order = np.argsort(numbers, kind="stable")
@@ -52,7 +56,9 @@ def _neighbours(triangles: np.ndarray) -> np.ndarray:
 
 def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
     """Return sizes, shape (n,), reduced in place so that they differ by at most 0.25 of the length of an edge.
-    Nodes have positions (n, 3), triangles the node numbers (m, 3)."""
+
+    Nodes have positions (n, 3), triangles the node numbers (m, 3).
+    """
     a, b = edges_of(triangles)[1].T
     growth = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
     while True:

@@ -244,7 +244,9 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
 
 def _compare_maps(left: csv_files.CsvTable, right: csv_files.CsvTable, names: list[str]) -> Comparison:
     """Return the comparison of two maps of walls at the positions (X, Y) of theirs.
-    Points of theirs that all lie outside ours are an InputError."""
+
+    Points of theirs that all lie outside ours are an InputError.
+    """
     from scipy.interpolate import LinearNDInterpolator
     ours, theirs = (np.column_stack([side.take(c, side.units[c]) for c in (*_MAP, *names)]) for side in (left, right))
     found = LinearNDInterpolator(ours[:, :2], ours[:, 2:])(theirs[:, :2])
@@ -266,7 +268,9 @@ def _compare_maps(left: csv_files.CsvTable, right: csv_files.CsvTable, names: li
 
 def _map_resolution(points: np.ndarray, scale: np.ndarray) -> float:
     """Return the largest change of a map at half of its n points if these are left out, over its range.
-    Points have X, Y and compared columns, shape (n, c), with ranges (c,)."""
+
+    Points have X, Y and compared columns, shape (n, c), with ranges (c,).
+    """
     from scipy.interpolate import LinearNDInterpolator
     if len(points) < 8:
         return np.nan
@@ -292,8 +296,10 @@ def _table(side: str, given: Any) -> csv_files.CsvTable:
 
 def _columns(left: csv_files.CsvTable, right: csv_files.CsvTable, given: Any) -> dict[str, str]:
     """Return the columns to compare, {our name: their name}, checked.
+
     `given` is the argument of `compare`; None for the first two columns of equal name, and for walls the first one and
-    "wall"."""
+    "wall".
+    """
     if given is None:
         shared = [c for c in left.columns if c in right.columns and c != "iterations"]
         pairs = {c: c for c in ([shared[0], "wall"] if "wall" in shared[1:] else shared[:2])}
@@ -315,8 +321,10 @@ def _columns(left: csv_files.CsvTable, right: csv_files.CsvTable, given: Any) ->
 
 def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | None) -> int | None:
     """Return the number of the column at whose values the others are compared, or None to pair by arc length.
+
     Our points have shape (n, c), theirs (l, c). An `along` that is no column, or not monotonic on both sides, is an
-    InputError."""
+    InputError.
+    """
     monotonic = [k for k in range(len(names)) if _is_monotonic(a[:, k]) and _is_monotonic(b[:, k])]
     if along is None:
         return min(monotonic, key=lambda k: _largest_slope(a, k), default=None)
@@ -343,8 +351,10 @@ def _largest_slope(points: np.ndarray, k: int) -> float:
 
 def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Difference:
     """Return the difference of one column between two curves, with its maximum and root mean square.
+
     Values have shape (k,). Partners, (k, c) in units of ranges, weight the mean by arc length; `size` is the range of
-    the column."""
+    the column.
+    """
     s = arc_length(partners)
     weights = np.ones(len(s))
     if s[-1] > 0:                                                   # trapezoidal weights
@@ -357,8 +367,10 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
 def _limit_points(table: csv_files.CsvTable, points: np.ndarray, names: list[str], control: str
                   ) -> list[dict[str, float]]:
     """Return the limit points of a curve, each as {column: value}.
+
     For a run they are its states of the kind "limit point", else vertices of parabolas through three points, (n, c),
-    where the control turns."""
+    where the control turns.
+    """
     if table.kinds is not None and "start" in table.kinds:
         return [dict(zip(names, p.tolist())) for p, kind in zip(points, table.kinds) if kind == "limit point"]
     from scipy.signal import find_peaks

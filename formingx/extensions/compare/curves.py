@@ -46,7 +46,9 @@ class SampledCurve:
 
     def closest_point(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
         """Return the closest point of the curve next to sample k, (c,), and True for a point beyond an end.
-        Only the two pieces of the curve that meet at the sample are examined."""
+
+        Only the two pieces of the curve that meet at the sample are examined.
+        """
         low, high = max(k - 1, 0), min(k + 1, CURVE_POINTS - 1)
         line = self.evaluate(np.linspace(self.arc_lengths[low], self.arc_lengths[high], PIECE_POINTS))
         d = np.diff(line, axis=0)
@@ -65,7 +67,9 @@ class SampledCurve:
 
 def pair_in_order(points: np.ndarray, curve: SampledCurve) -> tuple[np.ndarray, np.ndarray]:
     """Return k indices of points (n, c) and their partners on the curve, (k, c), of least squared distances in order.
-    Points beyond the ends are left out. Too many points, or points in the reverse order, are an InputError."""
+
+    Points beyond the ends are left out. Too many points, or points in the reverse order, are an InputError.
+    """
     n, line = len(points), curve.line
     if n > _MAX_POINTS:
         raise InputError(f"compare: theirs has {n} points; at most {_MAX_POINTS} can be compared: thin it out")
@@ -91,8 +95,10 @@ def pair_at_equal_values(points: np.ndarray, curve: np.ndarray, k: int) -> tuple
 
 def resolution_of(points: np.ndarray, k: int | None) -> float:
     """Return the largest error of a curve if every second point is interpolated from the others, dimensionless.
+
     Points have shape (n, c). The error is that of columns at equal column k, or with None the distance; infinite below
-    five points."""
+    five points.
+    """
     if len(points) < 5:
         return float("inf")
     kept = np.unique(np.append(np.arange(0, len(points), 2), len(points) - 1))

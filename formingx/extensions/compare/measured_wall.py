@@ -168,8 +168,10 @@ class MeasuredWall:
 
     def _locate(self, profile: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return positions of measured points on the middle line, (m,), and distances from it, (m,), length.
+
         Positions count the points of the polyline (2.5: between points 2 and 3). For arc lengths the distance is that
-        beyond an end; more than a tenth of the length is an InputError."""
+        beyond an end; more than a tenth of the length is an InputError.
+        """
         numbers = np.arange(len(profile.middle), dtype=float)
         if self.points is None:
             name = "length" if self.length is not None else "reference_length"

@@ -91,12 +91,14 @@ class Confidence:
 
 def confidence(run: Any, measured: Any) -> Confidence:
     r"""Return the uncertainty of design parameters that were fitted to a measured wall.
+
     With the computed walls h and the measured walls w at m points, and the n parameters p, the covariance is
 
     .. math:: C = s^2 (J^T J)^{-1}, \quad J_{ij} = \frac{1}{w_i} \frac{\partial h_i}{\partial p_j}, \quad
         s^2 = \frac{1}{m - n} \sum_i \left(\frac{h_i}{w_i} - 1\right)^2
 
-    The measured wall has m points; an InputError says if m is no larger than n, or if the run has no derivative."""
+    The measured wall has m points; an InputError says if m is no larger than n, or if the run has no derivative.
+    """
     wall, jacobian = run.derivative(measured.of_path)
     residual, size = wall / measured.wall - 1, run.parameters.size
     J = jacobian / measured.wall[:, None] * run.parameters.size

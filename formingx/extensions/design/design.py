@@ -179,7 +179,9 @@ class Design:
 
     def _search(self, first: DesignRun, objective: WallObjective, max_runs: int, min_change: float) -> DesignResult:
         """Search with Gauss-Newton steps from the best run, which are halved if a run is worse or fails.
-        The search ends after `max_runs` runs, or if the predicted relative change of the wall is below `min_change`."""
+
+        The search ends after `max_runs` runs, or if the predicted relative change of the wall is below `min_change`.
+        """
         from scipy.optimize import lsq_linear
         low, high, size = self.parameters.low, self.parameters.high, self.parameters.size
         best, runs, predicted, gained_before = first, [first], first.wall, 1.0

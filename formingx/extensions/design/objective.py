@@ -49,6 +49,7 @@ def missed_target(what: str, requested: float | None, found: float) -> str:
 
 class WallObjective:
     """Least-squares objective of a search: a wanted or an even wall thickness, and possibly a prescribed volume.
+
     The residuals are the relative deviations of the wall thickness at the nodes of the bottom face. The reference
     length of a node is its distance from the axis along the middle line of the undeformed body. The wanted thickness is
     a number, a function of the reference length or None for an even wall, and wrong ones are an InputError. Nodes
@@ -83,7 +84,8 @@ class WallObjective:
 
         with the thickness h at the m nodes that count, the wanted thickness w (for an even wall the mean of h), and the
         volume V. The last residual is left out without a prescribed volume V0. Residuals have shape (m,) or (m + 1,),
-        derivatives (m, n) or (m + 1, n). A run without derivative raises an InputError."""
+        derivatives (m, n) or (m + 1, n). A run without derivative raises an InputError.
+        """
         jacobian = run.derivative("wall")[1][self.inside]
         wall = run.wall[self.inside]
         target = wall.mean() if self.target_wall is None else self.target_wall
@@ -110,7 +112,9 @@ class WallObjective:
 
     def shortfall(self, run: DesignRun) -> str:
         """Return a text on the deviation of the best run from the wanted wall, and its reason.
-        It is "" if all deviations are below 1 %, or no wall was wanted."""
+
+        It is "" if all deviations are below 1 %, or no wall was wanted.
+        """
         if self.target_wall is None:
             return ""
         wall = run.wall[self.inside]
@@ -125,7 +129,9 @@ class WallObjective:
 
     def _limits(self, run: DesignRun) -> str:
         """Return a sentence that names the bounds or the prescribed volume that prevent the wanted wall.
-        The derivatives of the run predict how much of the deviation would remain without the bounds, or the volume."""
+
+        The derivatives of the run predict how much of the deviation would remain without the bounds, or the volume.
+        """
         try:
             residual, jacobian = self.residual(run)
         except InputError as error:
@@ -152,7 +158,9 @@ class WallObjective:
 
 class MeasuredWallObjective(WallObjective):
     """Least-squares objective of a search: a measured wall thickness, and possibly a prescribed volume.
-    The residuals are the relative deviations of the wall at the measured points of the part."""
+
+    The residuals are the relative deviations of the wall at the measured points of the part.
+    """
 
     damping = MEASURED_ACCURACY
 
@@ -187,7 +195,9 @@ def _range(wall: np.ndarray) -> str:
 
 def mask_of_range(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
     """Return the mask of nodes of the bottom face in a range of reference lengths, shape (k,).
-    With None all nodes count; fewer than two nodes are an InputError."""
+
+    With None all nodes count; fewer than two nodes are an InputError.
+    """
     s = run.reference_length
     if within is None:
         return np.ones(len(s), dtype=bool)

@@ -13,9 +13,12 @@ from ...errors import InputError, as_list, check_type, count, finite
 
 
 class Knots:
-    """A function of a length from 0 to 1, given by its values at k equidistant knots, shape (k,), whose lengths are
-    `coordinates`. It is a cubic spline if `smooth`, else straight in between. Lengths outside 0 to 1 count as the
-    nearest end, below -1 or above 2 they are an InputError: they were not divided by the length of the body."""
+    """A function of a length from 0 to 1, given by its values at k equidistant knots, shape (k,).
+
+    Their lengths are `coordinates`. It is a cubic spline if `smooth`, else straight in between. Lengths outside 0 to 1
+    count as the nearest end, below -1 or above 2 they are an InputError: they were not divided by the length of the
+    body.
+    """
 
     def __init__(self, values: Any, smooth: bool = False):
         self.values, self.smooth = np.array(values, dtype=float), smooth
@@ -101,6 +104,7 @@ def spline(knots: int, start: Any, low: float = -np.inf, high: float = np.inf, s
 
 class Parameters:
     """Parameters of a design as a vector of n numbers.
+
     A parameter that is a number has one entry, a profile has an entry for each knot.
 
     Attributes:
@@ -145,7 +149,9 @@ class Parameters:
 
     def vector(self, values: Mapping[str, Any]) -> np.ndarray:
         """Return the vector, shape (n,), for {parameter: number, values at the knots, or `Knots`}.
-        Other parameters have their start values. An unknown name or a wrong number of values is an InputError."""
+
+        Other parameters have their start values. An unknown name or a wrong number of values is an InputError.
+        """
         found, first = self.start.copy(), 0
         for name in values:
             if name not in self._given:

@@ -39,7 +39,9 @@ def trace_perturbed(path: Path, end: Any, perturbed: Sequence[PerturbedRun]) -> 
 
 class _PerturbedPaths:
     """Perturbed runs that follow the path of the base run, state by state.
-    A remeshed body, contact in space and a parameter that changes the control of a stage raise `Failure`."""
+
+    A remeshed body, contact in space and a parameter that changes the control of a stage raise `Failure`.
+    """
 
     def __init__(self, path: Path, end: Any, perturbed: Sequence[PerturbedRun]):
         if len(path.record.segments) > 1:
@@ -62,7 +64,9 @@ class _PerturbedPaths:
 
     def run(self) -> None:
         """Solve for the perturbed runs at the states of the base run, from its first state to its last.
-        Without derivatives by the parameters a `Failure` says why."""
+
+        Without derivatives by the parameters a `Failure` says why.
+        """
         states = self.path.states
         history = self.problem.history.path_dependent
         if history and any(state.kind == "jump" for state in states):
@@ -94,7 +98,9 @@ class _PerturbedPaths:
 
     def _start(self, state: State) -> None:
         """Set the perturbed runs to the first state of their path: undeformed, or in equilibrium with initial loads.
-        state: first state of the base run."""
+
+        state: first state of the base run.
+        """
         for run in self.runs:
             run.x, run.control = state.x.copy(), state.control
         self._closing: list[np.ndarray] = []
@@ -106,8 +112,10 @@ class _PerturbedPaths:
 
     def _begin_stage(self, setting: StepData) -> None:
         """Begin a stage, or a piece of a stage, in each perturbed run.
+
         Piece 0 of a stage is the change from the stage before; a stage in time has a piece between successive knots of
-        its amplitudes."""
+        its amplitudes.
+        """
         for run in self.runs:
             problem, p = run.problem, run.plans[setting.stage]
             current = problem.setting
@@ -153,7 +161,9 @@ class _PerturbedPaths:
 
     def _keep_open(self, state: State) -> None:
         """Set the contact points that are open in the base run at a state to stay open in all perturbed runs.
-        Points whose gap closes at the end of the step stay open too, in the base run and in the perturbed runs."""
+
+        Points whose gap closes at the end of the step stay open too, in the base run and in the perturbed runs.
+        """
         n = self.problem.n_owned
         for face, closing, *others in zip(self.problem.contacts, self._closing,
                                           *(run.problem.contacts for run in self.runs)):
@@ -165,8 +175,10 @@ class _PerturbedPaths:
 
     def _close_gaps(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
         """Move points of the perturbed runs whose gap closes in a step to their positions of gap closure.
+
         Returns the mask of those that close at the end of the step, shape (n,), for the n points of contact face
-        `number`."""
+        `number`.
+        """
         history, law, n = face.history, face.law, self.problem.n_owned
         no_points = np.zeros(len(face.points), dtype=bool)
         if history is None or not law.has_friction or not face.active:
@@ -189,8 +201,10 @@ class _PerturbedPaths:
 
     def _copy_contact_status(self, state: State) -> None:
         """Copy the contact status of the base run at a state to the perturbed runs.
+
         Points whose gap closed at the end of the step are projected onto the tool of the perturbed run, along the
-        velocity of the base run."""
+        velocity of the base run.
+        """
         n = self.problem.n_owned
         for number, face in enumerate(self.problem.contacts):
             if not face.law.has_history or not face.active:
@@ -217,8 +231,10 @@ class _PerturbedPaths:
 
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
         """Return the constraints that determine at which point of its path each run is compared.
+
         The first is None for the plane normal to the path; `last` says that a stage or a piece of a stage ends at the
-        state."""
+        state.
+        """
         setting = self.problem.setting
         if not last:
             timed = setting.rate[-1] and self.problem.history.rate_dependent
@@ -246,7 +262,9 @@ class _PerturbedPaths:
 
     def _gap_constraints(self) -> tuple[Any, list[Any]]:
         """Return constraints that close, in every run, the gap that closes at the end of the base run's step.
-        The first, of the base run, is None without such a gap."""
+
+        The first, of the base run, is None without such a gap.
+        """
         for number, closing in enumerate(self._closing):
             face = self.problem.contacts[number]
             size = np.where(closing, abs(face.rule.area), 0.0)
@@ -260,8 +278,10 @@ class _PerturbedPaths:
 
 def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: bool) -> Any:
     """Return a constraint of (x, control, gradient) that closes the gap of a point (None on other ranks).
+
     It returns the signed distance, length, and its derivative by the control, and fills the gradient by x if
-    `with_gradient`."""
+    `with_gradient`.
+    """
     local = np.array([] if point is None else [point], dtype=int)
     law = face.law.part(local)
 
@@ -286,7 +306,9 @@ def _fixed_properties(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[i
 
 def _projected(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
     """Move points along their velocities until they have given gaps, to first order; positions (n, 2), length.
-    Gaps are signed distances, shape (n,), length. A point with a velocity along the tool stays."""
+
+    Gaps are signed distances, shape (n,), length. A point with a velocity along the tool stays.
+    """
     near = law.nearest(x)
     rate = np.einsum("ni,ni->n", near.normal, velocity)
     towards = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)

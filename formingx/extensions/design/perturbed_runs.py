@@ -32,6 +32,7 @@ from ...values.tolerances import ROUND_OFF
 @dataclass(frozen=True)
 class PerturbedTolerances:
     """Convergence criterion of a perturbed run.
+
     A run has converged if its Newton correction of (x, control), over the distance of the perturbed state from the base
     state, is at most the tolerance. Without contact the tolerance is `formingx.values.tolerances.ROUND_OFF`, 1e-9.
 
@@ -54,8 +55,10 @@ _LARGEST_ROUND_OFF = 1e-10
 
 class PerturbedRunFailure(Failure):
     """Failure to find a state of a perturbed run near the state of the base run.
+
     The change of the parameter is too large: it moves contact points by more than the distance over which the contact
-    pressure begins."""
+    pressure begins.
+    """
 
 
 class _Start(NamedTuple):
@@ -67,6 +70,7 @@ class _Start(NamedTuple):
 
 class PerturbedRun:
     """Problem and present state of one perturbed run, a copy of the base run with one parameter slightly changed.
+
     Other elements, or another number of items or unknowns than in the base run, are an InputError.
 
     Attributes:
@@ -126,8 +130,10 @@ class PerturbedRun:
 
     def balance(self, base_residual: np.ndarray) -> None:
         """Set the `unbalanced` force of each contact by equilibrium with the internal forces of the body.
+
         The gaps differ from those of the base run by less than round-off, so the contact law gives no accurate
-        force."""
+        force.
+        """
         forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
         F = self.residual(base_residual)[: self.problem.n_owned]
         unit = forms.stress * forms.volume / forms.length
@@ -154,6 +160,7 @@ class PerturbedRun:
 def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun], equation: Any,
            equations: Sequence[Any]) -> np.ndarray:
     r"""Solve for the states of the perturbed runs near a state of the base run; collective.
+
     Modified Newton iterations use the tangent K and the constraint derivatives of the base run:
 
     .. math:: K \, dx + F_\lambda \, d\lambda = -F', \qquad c_x \, dx + c_\lambda \, d\lambda = -c'
@@ -162,7 +169,8 @@ def solve_perturbed(curve: Any, state: State, perturbed: Sequence[PerturbedRun],
     derivatives. The problem of the base run must be in the state, with the history variables of the state before it.
     `equation` is the constraint of the base run, None for the plane normal to its path. The residual of the base run is
     returned, shape (n,). PerturbedRunFailure: no state is found; Failure: the tangent is singular or the target
-    constant."""
+    constant.
+    """
     problem, newton = curve.problem, curve.newton
     problem.x.array_w[:] = state.x
     if not newton.tangent(problem.x, state.control):

@@ -24,7 +24,9 @@ _RANGE = "its range, or of its start value if a bound is missing"
 
 def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
     """Write the report of a search for design parameters as an HTML page (rank 0 writes), and return its path.
-    `deviations` is {parameter: standard deviation}, a `Fit`, a list of such, or None for no uncertainty."""
+
+    `deviations` is {parameter: standard deviation}, a `Fit`, a list of such, or None for no uncertainty.
+    """
     units = _units_of(result.best, units)
     before, best, (a, b) = result.before, result.best, result.cv
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
@@ -60,7 +62,9 @@ def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units)
 
 def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
     """Write the report of a run of a design as an HTML page (rank 0 writes), and return its path.
-    `deviations` is {parameter: standard deviation}, a `Fit`, a list of such, or None for no uncertainty."""
+
+    `deviations` is {parameter: standard deviation}, a `Fit`, a list of such, or None for no uncertainty.
+    """
     units = _units_of(run, units)
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
     wall = run.wall
@@ -90,8 +94,10 @@ def _units_of(run: Any, units: Units) -> Units:
 def _write(file: Any, title: str, summary: list[str], cards: list, notes: list, pictures: dict[str, Callable[[], str]],
            table: str, sections: list[str], comm: Any) -> FilePath:
     """Write the page of a report on rank 0, and return its path.
+
     Cards are (value, description) of large numbers, notes (kind, text) with the kind "bad" for warnings. `pictures` has
-    functions that return HTML elements."""
+    functions that return HTML elements.
+    """
     def make() -> None:
         """Draw the pictures and write the file."""
         attempts = Attempts()
@@ -119,7 +125,9 @@ def _parts(runs: list[Any], names: list[str], units: Units) -> dict[str, Callabl
 
 def _sections(runs: list[Any], names: list[str], units: Units) -> str:
     """Return an HTML figure of the sections of several runs side by side, coloured by the wall thickness.
-    runs: `DesignRun` objects. names: titles of their panels. units: units of the labels."""
+
+    runs: `DesignRun` objects. names: titles of their panels. units: units of the labels.
+    """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -142,7 +150,9 @@ def _sections(runs: list[Any], names: list[str], units: Units) -> str:
 
 def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations: Any, units: Units) -> None:
     """Draw the wall of a run over the reference length, with a band of its standard deviation.
-    `spread` is the deviation at the k nodes, shape (k,), length; None for no band. `deviations` name the band."""
+
+    `spread` is the deviation at the k nodes, shape (k,), length; None for no band. `deviations` name the band.
+    """
     s = run.reference_length
     axes.plot(s, run.wall, "." if run.in_space else "-", color=colour, label=label)
     if spread is not None:
@@ -156,7 +166,9 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
 
 def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
     """Return an HTML figure of wall thickness over arc length: of the first and the best run, predicted and wanted.
-    `spread` is the standard deviation of the best wall at the k nodes, shape (k,), length; None for no band."""
+
+    `spread` is the standard deviation of the best wall at the k nodes, shape (k,), length; None for no band.
+    """
     drawing, axes = figure(1, width=9, height=4)
     s = result.best.reference_length
     line, dashed = (".", ".") if result.best.in_space else ("-", "--")
@@ -192,7 +204,9 @@ def _profiles(before: Any, best: Any) -> str:
 
 def _heat_map(effects: Any, units: Units) -> str:
     """Return an HTML figure: a heat map of the derivatives of the wall by all parameters.
-    effects: the derivatives, an `Effects`. units: units of the labels."""
+
+    effects: the derivatives, an `Effects`. units: units of the labels.
+    """
     drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
     effects.plot(axes)
     axes.set(xlabel=units.label("reference_length"))
@@ -226,7 +240,9 @@ def _uncertainties(run: Any, deviations: Any, units: Units) -> list[str]:
 
 def _effects(run: Any, effects: Any, units: Units, before: Any = None) -> str:
     """Return an HTML table with the value, the bounds and the effects of every parameter.
-    `before`, the first run of a search or None, adds a column with its values."""
+
+    `before`, the first run of a search or None, adds a column with its values.
+    """
     p, tenth = run.parameters, effects.jacobian * effects.sizes / 10
     thin, volume_change = int(np.argmin(effects.value)), run.derivative("volume")[1][0] * p.size / 10
     head = ["", *(["before", "after"] if before else ["value"]), "lower bound", "upper bound",

@@ -86,8 +86,10 @@ class Band:
 
 def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray:
     """Return the covariance, shape (n, n), of the parameters of a design; each knot of a profile counts as one.
+
     `given` is {parameter: standard deviation}, a `Fit`, a `Confidence`, or a list of such, independent of each other.
-    Unknown names and undetermined constants are an InputError."""
+    Unknown names and undetermined constants are an InputError.
+    """
     found = np.zeros((len(parameters), len(parameters)))
     for part in given if isinstance(given, list | tuple) and not hasattr(given, "covariance") else [given]:
         if isinstance(part, Mapping):
@@ -117,7 +119,9 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
 
 def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
     """Return an output quantity of a run with its confidence band for uncertain parameters, to first order.
-    `given` and `measure` as in `DesignRun`; a level outside (0, 1) is an InputError."""
+
+    `given` and `measure` as in `DesignRun`; a level outside (0, 1) is an InputError.
+    """
     confidence = fraction("band: confidence", confidence)
     effects = run.sensitivities(measure)
     deviation = deviations(effects.jacobian, covariance_of("band", run.parameters, given))

@@ -26,8 +26,10 @@ Outputs = dict[Any, np.ndarray]
 
 
 class WholeRuns:
-    """Whole runs of a design at changed parameters, `workers` at a time: 1 in this process, else in the `executor` or
-    own processes. `count`: number of runs so far."""
+    """Whole runs of a design at changed parameters, `workers` at a time.
+
+    One runs in this process, several in the `executor` or in own processes. `count`: number of runs so far.
+    """
 
     def __init__(self, workers: int, executor: futures.Executor | None):
         self._workers, self._executor, self.count = workers, executor, 0
@@ -42,9 +44,11 @@ class WholeRuns:
         return number, f"{number} for differences of whole runs, {where}" if number else ""
 
     def neighbours(self, design: Any, vector: np.ndarray, measure: Any) -> list[tuple[Outputs, float]]:
-        """Compute a run with each entry of the parameters, shape (n,), changed; return its outputs and the change, by
-        parameter. The design must be importable in other processes. Outputs have the quantity `measure`; functions of a
-        path are kept for later calls."""
+        """Return the outputs of a run with each parameter changed, shape (n,), and the change, by parameter.
+
+        The design must be importable in other processes. Outputs have the quantity `measure`; functions of a path are
+        kept for later calls.
+        """
         if callable(measure) and measure not in self._functions:
             self._functions.append(measure)
         p = design.parameters

@@ -22,7 +22,9 @@ from .tested import MeasuredRange, nearest_test, principal_strains
 @register("scene")
 def expected_stretches_beyond_tests(body: Any) -> Iterator[Finding]:
     """Yield warnings for layers with constants that tests leave undetermined, and stretches beyond the tests.
-    For a target it is the largest stretch of a free dome, for a closed mould the root of the areal draw ratio."""
+
+    For a target it is the largest stretch of a free dome, for a closed mould the root of the areal draw ratio.
+    """
     for layer, tested in _tested(body.scene):
         about = f"materials[{layer!r}]"
         if tested.undetermined and tested.single_mode:
@@ -80,7 +82,9 @@ def _tested(scene: Any) -> list[tuple[str, MeasuredRange]]:
 
 def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return strains (n, 2), positions (n, 2 or 3), volumes (n,) at all points of a material; collective.
-    The columns of strains are the largest and middle logarithmic strain; points of all ranks, length and length^3."""
+
+    The columns of strains are the largest and middle logarithmic strain; points of all ranks, length and length^3.
+    """
     forms, cells = problem.forms, terms.own_cells
     F = isochoric_gradients(forms, cells, terms.places)
     squares = np.linalg.eigvalsh(F.transpose(0, 2, 1) @ F)[:, ::-1]

@@ -219,7 +219,9 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
 
 def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest | MeasuredOscillation]:
     """Return the tests of the files among the data; empty if the data are no files.
-    A `test` or `specimen` without files is an InputError."""
+
+    A `test` or `specimen` without files is an InputError.
+    """
     names = [data] if isinstance(data, str | os.PathLike) else data
     if not (isinstance(names, list | tuple) and names and all(isinstance(name, str | os.PathLike) for name in names)):
         if test is not None or specimen is not None:
@@ -235,7 +237,9 @@ def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest | Me
 
 def _temperatures(data: Any, files: Sequence[MeasuredTest | MeasuredOscillation], given: Any) -> list[float] | None:
     """Return the temperature of each test from the arguments of `fit`, or None if it is not known.
-    Another number of temperatures than tests, or ones in the files too, are an InputError."""
+
+    Another number of temperatures than tests, or ones in the files too, are an InputError.
+    """
     columns = [entry.temperature for entry in files]
     if given is None:
         if any(T is None for T in columns) and any(T is not None for T in columns):
@@ -276,7 +280,9 @@ def _fit_by_temperature(material: Any, files: Sequence[MeasuredTest | MeasuredOs
                         terms: int | None, relative: bool, weights: Any, within: Any, conversions: tuple[str, ...]
                         ) -> Fit:
     """Fit an elastic material at each temperature; its constants become tables over the temperature.
-    A constant that cannot depend on it, such as an exponent, is an InputError."""
+
+    A constant that cannot depend on it, such as an exponent, is an InputError.
+    """
     each: dict[float, Fit] = {}
     for T in sorted(set(temperatures)):
         points = Points(_elastic([f for f, at in zip(files, temperatures) if at == T]), relative, weights, within)
@@ -350,8 +356,10 @@ def _result(material: Any, constants: dict[str, float], parts: dict[str, slice],
             measured: np.ndarray, found: Uncertainty, tested: MeasuredRange, data: Any,
             floors: dict[str, float] | None = None) -> Fit:
     """Return the `Fit` with a copy of a fitted material that stores the range of its tests, and with its misfits.
+
     `misfit` is computed minus measured stress at m points, both (m,); `parts` has the slice of each test, `floors` its
-    smallest divisor over its largest stress."""
+    smallest divisor over its largest stress.
+    """
     fitted_material = copy.copy(material)
     fitted_material.tested = tested
     least = dict.fromkeys(parts, MIN_DIVISOR) if floors is None else floors
@@ -374,7 +382,9 @@ def _shares(found: Uncertainty, parts: dict[str, slice]) -> dict[str, dict[str, 
 
 def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Material, Uncertainty]:
     """Fit a material to elastic tests, which state no times; return it with the uncertainty of its constants.
-    `terms` are those of the class `Ogden`. Fewer points than constants, or no finite stress, are an InputError."""
+
+    `terms` are those of the class `Ogden`. Fewer points than constants, or no finite stress, are an InputError.
+    """
     from scipy.optimize import least_squares
     guesses = _guesses(material, points, terms)
     response, n, measured = guesses[0].response, len(guesses[0].parameters), points.measured
@@ -383,8 +393,10 @@ def _fit_elastic(material: Any, points: Points, terms: int | None) -> tuple[Mate
 
     def refined(guess: Material, start: Any, evaluations: int | None) -> tuple[float, Material, np.ndarray]:
         """Return (cost, guess, fitted coordinates of the constants) after a least-squares fit.
+
         It starts at coordinates (constants,), with at most `evaluations` (None: 100 for each). A stress that is not
-        finite costs infinity."""
+        finite costs infinity.
+        """
         low, high = np.array([bounds for _, *bounds in guess.coordinates()]).T
 
         def residual(x):
@@ -441,7 +453,9 @@ def _in_time(files: Sequence[MeasuredTest | MeasuredOscillation]) -> list[TimedT
 
 def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]:
     """Return materials with the constants from which a fit starts.
-    No material, wrong terms, or stresses whose sign differs from the strains are an InputError."""
+
+    No material, wrong terms, or stresses whose sign differs from the strains are an InputError.
+    """
     if isinstance(material, Material):
         if terms is not None:
             raise InputError(f"fit: terms = {terms!r} is for the class Ogden; {material} has its terms already")

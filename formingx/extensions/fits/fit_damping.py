@@ -87,8 +87,10 @@ def fit_spectrum(frequencies: Any, storage: Any, loss: Any, terms: int | None = 
 def fit_damping(material: Any, tests: Any, terms: int | None, relative: bool, weights: list[float], within: Any
                    ) -> tuple[KBKZ, dict[str, float], list[TimedTest], Uncertainty]:
     """Fit the damping function of a melt to tests in time; its spectrum does not change.
+
     The results are the material, {constant: value}, the tests as arrays and the uncertainty. A material without a
-    damping, `terms`, fewer points than constants or wrong tests are an InputError."""
+    damping, `terms`, fewer points than constants or wrong tests are an InputError.
+    """
     from scipy.optimize import least_squares
     if not isinstance(material, KBKZ) or material.damping is None or not material.damping.bounds:
         raise InputError("fit: KBKZ: give a card with a spectrum and a damping to begin with, such as"

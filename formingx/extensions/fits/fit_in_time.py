@@ -31,8 +31,10 @@ def fit_timed_tests(material: type[GeneralisedMaxwell] | GeneralisedMaxwell, tes
                    relative: bool, weights: list[float], within: Any
                    ) -> tuple[GeneralisedMaxwell, dict[str, float], list[Any], Uncertainty]:
     """Fit the constants of a relaxing material to tests in time.
+
     The results are the material, {constant: value}, the tests as arrays and the uncertainty. `terms` are branches, None
-    for at most 10. Wrong tests, fewer points than constants or no finite stress are an InputError."""
+    for at most 10. Wrong tests, fewer points than constants or no finite stress are an InputError.
+    """
     law = material if isinstance(material, type) else type(material)
     data = _TimedData(checked_tests(tests, within), law, relative, weights)
     if isinstance(material, GeneralisedMaxwell):
@@ -54,8 +56,10 @@ def fit_timed_tests(material: type[GeneralisedMaxwell] | GeneralisedMaxwell, tes
 
 def checked_tests(tests: Any, within: Any = None) -> list[Any]:
     """Return tests in time and by oscillations as arrays, with nan for stresses at stretches outside `within`.
+
     A constant stretch with a positive first time gets a point at time 0. Inconsistent tests, or none with a stress, are
-    an InputError."""
+    an InputError.
+    """
     found: list[Any] = []
     for i, test in enumerate(as_list("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
         name = f"fit: data: number {i}"
@@ -79,6 +83,7 @@ def _initial_material(kind: type[GeneralisedMaxwell]) -> GeneralisedMaxwell:
 
 class _TimedData:
     """Measured values of all tests as one vector, and the values of a relaxing material in the same n rows.
+
     Tests whose times are all the same are an InputError.
 
     Attributes:
@@ -127,6 +132,7 @@ class _TimedData:
 
 class ShiftedTests:
     """Values of a relaxing material in tests at several temperatures.
+
     A branch with the relaxation time tau at the reference temperature has the time aT tau in a test with the shift aT.
     The stresses of branches are computed once, over a wide range of times.
 
@@ -151,7 +157,9 @@ class ShiftedTests:
 
     def branches(self, tau: np.ndarray, factors: np.ndarray) -> np.ndarray:
         """Return the stresses of j branches of unit modulus at all measured points, shape (n, j).
-        The relaxation times tau, shape (j,), hold at the reference temperature; `factors` are the shifts of tests."""
+
+        The relaxation times tau, shape (j,), hold at the reference temperature; `factors` are the shifts of tests.
+        """
         found = []
         for (low, high, branch), a in zip(self._branches, factors):
             log_tau = np.log(tau) + np.log(a)
@@ -161,7 +169,9 @@ class ShiftedTests:
 
     def spectrum_misfit(self, factors: np.ndarray) -> float:
         """Return the squared misfit of the best spectrum with two times per decade and nonnegative moduli.
-        `factors` are the shifts of the tests."""
+
+        `factors` are the shifts of the tests.
+        """
         from scipy.optimize import nnls
         low = min(first - np.log(a) for (first, _, _), a in zip(self._branches, factors))
         high = max(last - np.log(a) for (_, last, _), a in zip(self._branches, factors))
@@ -173,7 +183,9 @@ class ShiftedTests:
 
     def stresses(self, material: GeneralisedMaxwell, constants: Any, factors: np.ndarray) -> np.ndarray:
         """Return the nominal stresses of a material at all measured points, shape (n,), with shifts of tests.
-        The constants, at the reference temperature, have the order of `parameters`."""
+
+        The constants, at the reference temperature, have the order of `parameters`.
+        """
         values, n = np.asarray(constants, float), len(material.parameters) - 2 * len(material.branches)
         rest = equilibrium_values(self._rows, material.equilibrium, values[:n])
         return rest + self.branches(values[n + 1::2], factors) @ values[n::2]
@@ -181,8 +193,10 @@ class ShiftedTests:
 
 def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tuple[GeneralisedMaxwell, float]:
     """Return a material of n fitted branches, ascending in time, and the root mean square of relative misfits.
+
     A given material of n branches is one of the guesses. Fewer points than constants, or no finite stress, are an
-    InputError."""
+    InputError.
+    """
     from scipy.optimize import least_squares
     if len(data.stress) < (needed := len(material.parameters) - 2 * len(material.branches) + 2 * n):
         raise InputError(f"fit: {len(data.stress)} points cannot fix the {needed} constants of"
@@ -216,8 +230,10 @@ def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tup
 
 def _guesses(data: _TimedData, material: GeneralisedMaxwell, n: int) -> list[GeneralisedMaxwell]:
     """Return materials with n branches from which a fit starts.
+
     A spectrum of many times is fitted first. Times stand for equal shares of its moduli, then lie at equal ratios; the
-    given material is third if it has n branches."""
+    given material is third if it has n branches.
+    """
     from scipy.optimize import nnls
     equilibrium = material.equilibrium
     shape = data.equilibrium_stress(equilibrium)[:, None] / data.sizes[:, None]
@@ -238,7 +254,9 @@ def _guesses(data: _TimedData, material: GeneralisedMaxwell, n: int) -> list[Gen
 
 def _scaled(material: Material | None, factor: float, I1: float) -> Material | None:
     """Return a first guess of an equilibrium with `factor` times the modulus, with finite stress up to I1.
-    A class without first guesses keeps the material; None stays None."""
+
+    A class without first guesses keeps the material; None stays None.
+    """
     if material is None:
         return None
     try:

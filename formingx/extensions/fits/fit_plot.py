@@ -16,8 +16,10 @@ _XLABELS = {"time": "time ({})", "stretch": "stretch", "frequency": "angular fre
 
 def draw_fit(material: Any, data: Any, axes: Any, unit: str, unit_of_time: str) -> Any:
     """Draw measured and fitted stresses over the stretch, of relaxation tests over the time, moduli over the frequency.
+
     It returns the axes, one for each of these kinds of tests; another number of given axes is an InputError. Data are
-    {test: columns} or a list of `TimedTest` and `OscillationTest`."""
+    {test: columns} or a list of `TimedTest` and `OscillationTest`.
+    """
     kinds = ["stretch"] if isinstance(data, dict) else [_kind(test) for test in data]
     present = [kind for kind in _XLABELS if kind in kinds]
     if axes is None:
@@ -49,7 +51,9 @@ def _kind(test: Any) -> str:
 
 def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
     """Draw {test: (stretches, stresses)}, (n,) each, with curves of the material on axes.
-    "biaxial" has two stretches and two stresses."""
+
+    "biaxial" has two stretches and two stresses.
+    """
     for mode, (l, *others, P) in data.items():
         if others:                                          # two stretches, two stresses
             _draw_biaxial(material, (l, *others, P), panel)
@@ -61,7 +65,9 @@ def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
 
 def _draw_biaxial(material: Any, columns: Any, panel: Any) -> None:
     """Draw stresses of a biaxial test over its first stretch, and the stresses of the material as crosses.
-    Columns are two stretches and two nominal stresses, (n,) each."""
+
+    Columns are two stretches and two nominal stresses, (n,) each.
+    """
     l1, l2, *stresses = (np.asarray(x, float) for x in columns)
     computed = material.stress("biaxial", np.stack([l1, l2]))
     for k, (P, found) in enumerate(zip(stresses, computed), 1):

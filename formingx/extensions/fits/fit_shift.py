@@ -72,8 +72,10 @@ def fit_shift(fitted: Callable, material: Any, tests: list[Any], temperatures: n
               reference: float, unit: str, terms: int | None, relative: bool, weights: list[float], within: Any
               ) -> ShiftedFit:
     """Fit the constants of a relaxing material and their shift with the temperature.
+
     `fitted` fits at one temperature; tests have temperatures (n,) in "C" or "K"; the kind is "WLF", "Arrhenius" or
-    "table". An unknown shift, or too few temperatures, is an InputError."""
+    "table". An unknown shift, or too few temperatures, is an InputError.
+    """
     from scipy.optimize import minimize
     check_name("fit: shift", kind, SHIFTS)
     law = _law(kind, np.asarray(temperatures, float), reference, unit)
@@ -186,7 +188,9 @@ def _law(kind: str, temperatures: np.ndarray, reference: float, unit: str) -> _S
 
 class _LogTable:
     """Shift aT(T) whose logarithm is a smooth curve through given points, constant beyond them.
-    Points are {temperature: log10 aT}."""
+
+    Points are {temperature: log10 aT}.
+    """
 
     def __init__(self, points: dict[float, float]):
         self._table = Table(points)

@@ -80,8 +80,10 @@ class MeasuredTest(NamedTuple):
 
 def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> list[MeasuredTest | MeasuredOscillation]:
     """Return the tests of a CSV file, by default with columns test, stretch, nominal stress and, in time, time.
+
     A test ends where its name or temperature changes, or the time decreases. `specimen` has "length" and "area", or
-    "width" and "thickness", for displacement and force. A malformed file is an InputError."""
+    "width" and "thickness", for displacement and force. A malformed file is an InputError.
+    """
     caller = f"fit: data: {file}"
     try:
         rows = records(file)
@@ -121,8 +123,10 @@ def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> lis
 
 def _head(caller: str, rows: list[tuple[int, list[str]]]) -> tuple[int, dict[str, int] | None, dict[str, Any]]:
     """Return the line behind the one that names the columns, {quantity or name: column}, and {quantity: unit or None}.
+
     A title is skipped; without names it is (0, None, {}). Two columns of one quantity, or an unknown unit, are an
-    InputError."""
+    InputError.
+    """
     for start, (_, row) in enumerate(rows, 1):
         cells = [name_and_unit(cell) for cell in row]
         quantities = [_NAMES.get(_plain(words)) for words, _ in cells]
@@ -151,7 +155,9 @@ def _head(caller: str, rows: list[tuple[int, list[str]]]) -> tuple[int, dict[str
 def _checked_columns(caller: str, columns: dict[str, int], rows: list[tuple[int, list[str]]], start: int,
                      units: dict[str, Any], test: str | None) -> dict[str, int]:
     """Return {quantity: column} of the columns that a fit uses, without unused columns of text.
-    An unused column of numbers, a missing column, or an unknown unit is an InputError."""
+
+    An unused column of numbers, a missing column, or an unknown unit is an InputError.
+    """
     what = ("must be test, stretch (or strain, displacement), stress (nominal, true, or force), and time if any")
     names = ", ".join(repr(name_and_unit(cell)[0]) for cell in rows[start - 1][1] if not is_number(cell))
     for needed in ((("test",),) if test is None else ()) + (_STRETCHES, _STRESSES):
@@ -177,7 +183,9 @@ def _plain(words: str) -> str:
 
 def _point(where: str, row: list[str], width: int, columns: dict[str, int], test: str | None) -> dict[str, Any]:
     """Return a row of the file as {quantity: value}; an empty stress in a test in time is nan.
-    Another number of cells, an unknown test, or a cell that is no number is an InputError."""
+
+    Another number of cells, an unknown test, or a cell that is no number is an InputError.
+    """
     if len(row) != width or len(columns) < 3 - (test is not None):
         raise InputError(f"{where}: has {len(row)} columns: must be test, stretch, stress or test, stretch, stress,"
                          f" time, the same in all lines")
@@ -197,7 +205,9 @@ def _point(where: str, row: list[str], width: int, columns: dict[str, int], test
 def _converted(caller: str, points: list[dict[str, Any]], units: dict[str, Any], specimen: Any
                ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
     """Return points with stretch and nominal stress, and what was done as text.
-    A specimen whose size is missing, not positive, or not used is an InputError."""
+
+    A specimen whose size is missing, not positive, or not used is an InputError.
+    """
     given = dict(check_type("fit: specimen", {} if specimen is None else specimen, Mapping,
                             "a dict such as {'length': 30.0, 'width': 4.0, 'thickness': 1.0}"))
     for name in given:
@@ -237,8 +247,10 @@ def _converted(caller: str, points: list[dict[str, Any]], units: dict[str, Any],
 
 
 def _test_numbers(points: list[dict[str, Any]]) -> list[int]:
-    """Return for each row of a file the number of the test to which it belongs, counted from 0. A test ends where its
-    name or its temperature changes, or the time decreases."""
+    """Return for each row of a file the number of its test, counted from 0.
+
+    A test ends where its name or its temperature changes, or the time decreases.
+    """
     found, n = [], 0
     for point, last in zip(points, [points[0], *points]):
         n += (point["test"] != last["test"] or point.get("temperature") != last.get("temperature")

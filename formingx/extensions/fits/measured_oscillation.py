@@ -59,7 +59,9 @@ class MeasuredOscillation(NamedTuple):
 def read_oscillations(caller: str, columns: dict[str, int], rows: list[tuple[int, list[str]]], units: dict[str, Any],
                       test: str | None) -> list[MeasuredOscillation]:
     """Return the tests by oscillations of a file; a test ends where its mode or temperature changes.
-    Rows are (line number, cells). Missing columns, an unknown mode or a cell that is no number are an InputError."""
+
+    Rows are (line number, cells). Missing columns, an unknown mode or a cell that is no number are an InputError.
+    """
     used = used_columns(caller, columns, rows, units, {*OSCILLATION_COLUMNS, "test", "temperature"}, _UNITS)
     pairs = [names for names in _PAIRS if set(names) & used.keys()]
     if len(pairs) != 1 or not set(pairs[0]) <= used.keys():
@@ -98,7 +100,9 @@ def read_oscillations(caller: str, columns: dict[str, int], rows: list[tuple[int
 def used_columns(caller: str, columns: dict[str, int], rows: list[tuple[int, list[str]]], units: Mapping[str, Any],
                  known: Container[str], units_of: Mapping[str, tuple[str, ...]]) -> dict[str, int]:
     """Return {quantity: column} of the known columns, without unused columns of text.
-    An unknown column of numbers, or a unit that is not in {quantity: units}, is an InputError."""
+
+    An unknown column of numbers, or a unit that is not in {quantity: units}, is an InputError.
+    """
     for name, k in columns.items():
         numeric = any(k < len(row) and is_number(row[k]) for _, row in rows)
         if name not in known and numeric:

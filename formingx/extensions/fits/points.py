@@ -13,6 +13,7 @@ from .weights import divisors, in_range, named_weights
 
 class Points:
     """Measured stresses of elastic tests, which state no times, checked, as one vector of m numbers.
+
     A biaxial test has two stresses at each of its points, the other tests have one. Inconsistent tests, no strain, or
     no point within the range are an InputError.
 
@@ -87,7 +88,9 @@ def hint_if_strains(values: np.ndarray) -> str:
 
 def _checked(mode: str, columns: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return stretches and nominal stresses of a test in both in-plane directions, shape (2, n) each, checked.
-    A stress that was not measured is nan. An unknown mode, wrong shapes, or inadmissible numbers are an InputError."""
+
+    A stress that was not measured is nan. An unknown mode, wrong shapes, or inadmissible numbers are an InputError.
+    """
     check_name("fit: data: test", mode, [*homogeneous.MODES, "biaxial"])
     biaxial = mode == "biaxial"
     what = "(stretch 1, stretch 2, nominal stress 1, nominal stress 2)" if biaxial else "(stretch, nominal stress)"

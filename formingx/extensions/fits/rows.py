@@ -38,7 +38,9 @@ class Rows(Protocol):
 
     def branch(self, law: Any, log_tau: np.ndarray, accuracy: float) -> Callable[[np.ndarray], np.ndarray]:
         """Return a function that gives the values of k branches of unit modulus, shape (n, k).
-        Its argument has the logarithms of their relaxation times, shape (k,), in the range of the grid `log_tau`."""
+
+        Its argument has the logarithms of their relaxation times, shape (k,), in the range of the grid `log_tau`.
+        """
 
     def equilibrium(self, stress: np.ndarray) -> np.ndarray:
         """Return the values of the equilibrium, shape (n,), from its stresses at `stretches`, shape (m,)."""
@@ -124,7 +126,9 @@ def rows_of(test: TimedTest | OscillationTest) -> Rows:
 
 def equilibrium_values(rows: list[Rows], material: Material | None, constants: Any = None) -> np.ndarray:
     """Return the values of an equilibrium (None: 0) in all rows, (n,); inf or nan beyond its limit.
-    The constants of the material are replaced by `constants` if these are given."""
+
+    The constants of the material are replaced by `constants` if these are given.
+    """
     if material is None:
         return np.zeros(sum(len(part.measured) for part in rows))
     values = material.parameters.values() if constants is None else constants

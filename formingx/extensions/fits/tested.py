@@ -170,7 +170,9 @@ def nearest_test(largest: float, middle: float) -> str:
 
 def _hull(points: np.ndarray) -> np.ndarray:
     """Return the k corners of the convex hull of points, shape (n, 2), counter-clockwise, shape (k, 2).
-    It is computed by Andrew's monotone chain algorithm."""
+
+    It is computed by Andrew's monotone chain algorithm.
+    """
     ordered = sorted(map(tuple, np.unique(points.round(10), axis=0)))
     if len(ordered) < 3:
         return np.array(ordered)
@@ -178,7 +180,8 @@ def _hull(points: np.ndarray) -> np.ndarray:
     def half(chain: Any) -> list[tuple[float, float]]:
         """Return the corners of one half of the hull, without the last.
 
-        chain: all points (x, y) in ascending order, for the lower half, or in descending order, for the upper half."""
+        chain: all points (x, y) in ascending order, for the lower half, or in descending order, for the upper half.
+        """
         found: list[tuple[float, float]] = []
         for x, y in chain:
             while len(found) > 1 and ((found[-1][0] - found[-2][0]) * (y - found[-2][1])

@@ -41,7 +41,8 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
     with the computed stresses P, the measured ones M, their divisors d and the fitted constants c (Seber and Wild 1989,
     chapter 5). A standard error is nan if there are no more points than constants. It is infinite if doubling the
     constant changes no stress by more than 1e-6 of its divisor. The function `stress` maps constants (p,) to stresses
-    (n,); measured stresses and sizes d have shape (n,)."""
+    (n,); measured stresses and sizes d have shape (n,).
+    """
     values = np.array(list(constants.values()), float)
     first = stress(values)
     slopes = np.stack([_slope(stress, first, values, i, sizes) for i in range(len(values))], axis=1)
@@ -66,8 +67,10 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
     """Return the derivative of the stresses over their sizes, (n,), by constant i of (p,) values.
+
     The step grows until a stress changes by more than 1e-6 of its size; if it exceeds the constant, the derivative is
-    0."""
+    0.
+    """
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
     largest = abs(values[i]) or math.inf        # a larger step of an exponent without effect would have one
     for _ in range(50):

@@ -15,8 +15,10 @@ MIN_DIVISOR = 0.02
 def divisors(parts: list[np.ndarray], relative: Any, weights: list[float], floors: list[float] | None = None
              ) -> np.ndarray:
     """Return the stress by which the misfit of each measured stress is divided, shape (n,).
+
     `relative` takes the stress itself, at least its test's largest times the floor (default 0.02), otherwise the
-    largest of all; weights divide by their root. Neither True nor False is an InputError."""
+    largest of all; weights divide by their root. Neither True nor False is an InputError.
+    """
     relative = check_type("fit: relative", relative, bool, "True or False")
     largest = max((float(np.abs(P).max()) for P in parts if len(P)), default=1.0) or 1.0
     found = []
@@ -28,8 +30,10 @@ def divisors(parts: list[np.ndarray], relative: Any, weights: list[float], floor
 
 
 def named_weights(weights: Any, names: list[str]) -> list[float]:
-    """Return the weight of each test from {test: weight}, in the order of names; the default is 1. An unknown test, or
-    a weight that is not positive, is an InputError."""
+    """Return the weight of each test from {test: weight}, in the order of names; the default is 1.
+
+    An unknown test, or a weight that is not positive, is an InputError.
+    """
     if weights is None:
         return [1.0] * len(names)
     if not isinstance(weights, dict):
@@ -41,8 +45,10 @@ def named_weights(weights: Any, names: list[str]) -> list[float]:
 
 
 def numbered_weights(weights: Any, count: int) -> list[float]:
-    """Return the weights of a list of tests in time; None: all 1. Another number of weights, or one that is not
-    positive, is an InputError."""
+    """Return the weights of a list of tests in time; None: all 1.
+
+    Another number of weights, or one that is not positive, is an InputError.
+    """
     if weights is None:
         return [1.0] * count
     given = as_list("fit: weights", weights, "numbers, one for each test")
@@ -60,7 +66,9 @@ def _weight(name: str, value: Any) -> float:
 
 def in_range(within: Any, stretches: np.ndarray) -> np.ndarray:
     """Return the mask of the stretches, any shape, in the range `within`; None for all.
-    No pair of ascending stretches is an InputError."""
+
+    No pair of ascending stretches is an InputError.
+    """
     if within is None:
         return np.ones(np.shape(stretches), dtype=bool)
     low, high = pair("fit: within", within)

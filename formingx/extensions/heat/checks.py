@@ -42,7 +42,8 @@ def error_of_layers(layers: float, biot: float) -> float:
 
     The constants are fitted to computed errors at the time 0.01 h^2/a, with the thickness h of the sheet and its
     diffusivity a. Biot number Bi: conductance of the face times thickness over conductivity. The error is relative to
-    the span of temperatures."""
+    the span of temperatures.
+    """
     return _ERROR_OF_ONE_LAYER * _biot_factor(biot) * layers ** -_LAYER_ORDER
 
 
@@ -85,8 +86,10 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 @register("scene")
 def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
     """Yield a warning for each constant that is more than twice as large at the lowest temperature as at the highest.
+
     The stress of the stretched part then increases on cooling. Such a part springs back, while a part that solidifies
-    keeps its shape."""
+    keeps its shape.
+    """
     scene = body.scene
     if scene.heat is None:
         return
@@ -113,7 +116,9 @@ def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
 @register("start")
 def implausible_units(body: Any) -> Iterator[Finding]:
     """Yield warnings for temperatures, conductances and diffusivities that no polymer process has; collective.
-    A body has from 200 to 680 K, its surroundings at least 200 K, and the Biot number is at most 1e4."""
+
+    A body has from 200 to 680 K, its surroundings at least 200 K, and the Biot number is at most 1e4.
+    """
     scene = body.scene
     if scene.heat is None:
         return
@@ -187,7 +192,9 @@ def beyond_known_range(body: Any) -> Iterator[Finding]:
 @register("end")
 def passed_known_range(path: Any) -> Iterator[Finding]:
     """Yield a warning for each end of a constant's range that the temperature of the body passed; collective.
-    Constants about which a check warned before the run are left out."""
+
+    Constants about which a check warned before the run are left out.
+    """
     reported = {finding.about for finding in path.record.findings}
     states = path.record.segments[-1].states
     for k, history in enumerate(path.problem.history.parts):
@@ -202,7 +209,9 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
 
 def _outside_known_range(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
     """Yield warnings for constants of materials, friction and expansion that are unknown at `low` or at `high`.
-    `cause` is subject and verb of the message, such as "the run brought it"."""
+
+    `cause` is subject and verb of the message, such as "the run brought it".
+    """
     laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
             for name, value in material.constants().items()]
     laws += [(repr(contact), "friction", contact.mu) for contact in scene.contacts]

@@ -40,6 +40,7 @@ _MAX_ITERATIONS = 20
 
 class Conduction(HeatVectors):
     """Finite element equations M dT/dt = R(T) of heat conduction in a body and in the tools that touch it.
+
     A temperature state is a list. Its first array has the temperatures of the body at the n locally owned nodes. One
     array follows per tool contact, shape (contact nodes, m). It has the excess temperatures of the tool over its back,
     at m nodes along the depth below each contact node, the face first. Entries of M and R of the body are divided by
@@ -116,7 +117,9 @@ class Conduction(HeatVectors):
 
     def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         """Return the rates of heat M dT/dt, with the shapes of `state`, and the heat per time of faces and sources.
-        Rates of the body are over its heat capacity, degrees per time; those of tools per contact area."""
+
+        Rates of the body are over its heat capacity, degrees per time; those of tools per contact area.
+        """
         R = self._body_rate(state[0])
         found, through = [R], []
         for touch, excess in zip(self.tool_contacts, state[1:], strict=True):
@@ -133,7 +136,8 @@ class Conduction(HeatVectors):
 
         M is the capacity matrix, R the rate of heat, Delta the change of the temperatures y. `state` and `known` (k)
         are temperature states, see the class. The guess of the change of the body has shape (n,), degrees. Without a
-        solution, ConvergenceError is raised."""
+        solution, ConvergenceError is raised.
+        """
         T = state[0]
         responses = [touch.response(excess, k, c) for touch, excess, k in zip(self.tool_contacts, state[1:], known[1:])]
         change = np.where(self._fixed_mask, 0.0, guess)
@@ -161,7 +165,8 @@ class Conduction(HeatVectors):
         M is the capacity matrix, R' the derivative of the rate of heat, Delta the change of temperature. The factorised
         matrix of the last `stage` is reused if it had the same c; otherwise it is assembled at the last temperature. k
         is a temperature state of heats. The results are the largest absolute change on all ranks and the change of the
-        body, shape (n,), degrees."""
+        body, shape (n,), degrees.
+        """
         responses = [touch.response(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
         self._factorise(c, responses, afresh=False)
         rhs = known[0].copy()
@@ -190,7 +195,9 @@ class Conduction(HeatVectors):
     def _end_of_stage(self, T: np.ndarray, change: np.ndarray, known: list[np.ndarray], c: float,
                 responses: list[Any]) -> ImplicitStage:
         """Return changes, rates and heats of a converged implicit stage.
-        T and its change have shape (n,), degrees; `known` is a temperature state of heats; c is in units of time."""
+
+        T and its change have shape (n,), degrees; `known` is a temperature state of heats; c is in units of time.
+        """
         R = self._body_rate(T + change)
         changes, rates, through = [change], [R], []
         for touch, response, k in zip(self.tool_contacts, responses, known[1:]):
@@ -209,9 +216,11 @@ class Conduction(HeatVectors):
 
     def _set_deformation(self) -> None:
         """Set the UFL factors by which the deformation enters the forms.
+
         `_weight` is the reference volume per area of the section. `_area` is the deformed area of a face per reference
         length of its line. `_J` is det F. `_gradient_map` is F^-T, which maps Grad T to grad T; None without
-        displacement."""
+        displacement.
+        """
         kinematics, u, X = self._kinematics, self._u, self._X
         self._weight, self._J, self._gradient_map = kinematics.weight(X), self.constant(1.0), None
         self._area = self._weight
@@ -338,7 +347,9 @@ class Conduction(HeatVectors):
 
     def _factorise(self, c: float, responses: list[Any], afresh: bool) -> None:
         """Factorise M - c R' of an implicit stage: capacity matrix M, derivative R' of rates of heat at the last `T`.
-        Tools add their conductance to the diagonal. Factors of the same c are reused unless `afresh`."""
+
+        Tools add their conductance to the diagonal. Factors of the same c are reused unless `afresh`.
+        """
         if self._factored_for == c and not afresh:
             return
         self._factored_for = c

@@ -129,6 +129,7 @@ class ContactWithTool:
 
 class ToolResponse(NamedTuple):
     """Linear response of a tool to the flux q into the body, in an implicit stage of a time step.
+
     The tool has m nodes along its depth below each of n contact nodes. The flux is q = `conductance`
     (`face_temperature` - T) with the temperature T of the body. The tool's temperatures change in the stage by `change`
     - q `compliance`.
@@ -148,6 +149,7 @@ class ToolResponse(NamedTuple):
 
 class HeatContact:
     """Contact nodes of a face with a tool, and the temperatures in the tool below them.
+
     The face has n locally owned nodes. Below each, the tool has m nodes along its depth, from its face to the last one
     before its back. Their excess temperatures over the back are differences to its temperature, shape (n, m). A tool of
     prescribed temperature has m = 0.
@@ -205,7 +207,8 @@ class HeatContact:
         M and K are the capacity and conductivity matrices along the depth of the tool, and Delta is the change of its
         excess temperatures w. The vector e_1 is 1 at the node on the face of the tool, else 0. Excess temperatures and
         known heats k per contact area have shape (n, m). With `absolute` False, temperatures are differences of two
-        states, and the back has 0."""
+        states, and the back has 0.
+        """
         back = self.back if absolute else 0.0
         if not self.conducts:
             return ToolResponse(np.full(len(self.dofs), back), self.conductance, excess, np.zeros(0))

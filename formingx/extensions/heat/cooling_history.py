@@ -93,8 +93,7 @@ class CoolingHistory:
         return [(touch, contact, touch.conductance.copy()) for touch, contact in zip(touching, contacts, strict=True)]
 
     def errors_in_space(self, states: Sequence[Any]) -> np.ndarray:
-        """Estimate the largest discretisation error of the temperature in each accepted state, degrees, shape
-        (states,); collective."""
+        """Estimate the largest error of temperature in space in each state, degrees, shape (states,); collective."""
         return np.array([error for error, _ in self._space_errors(states)])
 
     def _space_errors(self, states: Sequence[Any]) -> list[tuple[float, str]]:
@@ -123,7 +122,9 @@ class CoolingHistory:
 
     def _contact_end(self, place: np.ndarray) -> str:
         """Return the end of a contact at a reference position, shape (2,), length, as text; "" if there is none.
-        A contact ends there if only some of the three nearest nodes of its face touch the tool."""
+
+        A contact ends there if only some of the three nearest nodes of its face touch the tool.
+        """
         for touch, contact, _ in self._contacts:
             nodes = gathered(self._problem.comm, np.column_stack([touch.points, touch.conductance > 0]))
             nearest = np.argsort(np.linalg.norm(nodes[:, :2] - place, axis=1))[:3]
@@ -133,9 +134,11 @@ class CoolingHistory:
         return ""
 
     def findings(self, states: Sequence[Any]) -> list[Finding]:
-        """Return a warning in a list if the mesh is too coarse for the temperatures of a run, else an empty one;
-        collective. The error is estimated in at most eight states and at the ends of stages. At the end of a contact
-        that moves on it decays, so there it counts at the ends of stages only."""
+        """Return a warning in a list if the mesh is too coarse for the temperatures of a run; collective.
+
+        The error is estimated in at most eight states and at the ends of stages. At the end of a contact that moves on
+        it decays, so there it counts at the ends of stages only.
+        """
         states = [state for state in states if state.time > 0]
         if not states:
             return []
@@ -172,9 +175,11 @@ class CoolingHistory:
         self._update_problem()
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Solve the heat equation over a step to x, owned entries, with the body at its position halfway through the
-        step. A contact node that closes or opens has half its conductance: the step is of second order. start: state at
-        the start; None: the body is at x all the time. ConvergenceError: the end was not reached."""
+        """Solve the heat equation over a step to x, owned entries, with the body where it is halfway through the step.
+
+        A contact node that closes or opens has half its conductance: the step is of second order. start: state at the
+        start; None: the body is at x all the time. ConvergenceError: the end was not reached.
+        """
         until = self._forms.time_at(control)
         if self._power is not None:                         # the materials have advanced
             power = self._cooling.work_to_heat * self._body.assembled(self._dissipated)
@@ -204,8 +209,10 @@ class CoolingHistory:
 
     def ahead(self, time: float, control: float, read: Callable[[], float]) -> float:
         """Return `read()` with the temperatures that the body has at a later time if it stays where the forms are.
+
         control: load parameter (control) of the state to which the forms are set, dimensionless. The present
-        temperatures are restored. At an earlier time the present temperatures are read."""
+        temperatures are restored. At an earlier time the present temperatures are read.
+        """
         if time <= self._time:
             return read()
         present = self._time, self._dt, self._state
@@ -265,8 +272,10 @@ class CoolingHistory:
                           for touch, excess in zip(self._body.tool_contacts, variables.tool_excess, strict=True)]}
 
     def load(self, data: dict[str, Any]) -> HeatState:
-        """Return the state of this rank from data of `save`; InputError: another mesh, or `work_to_heat` in one run
-        only."""
+        """Return the state of this rank from data of `save`.
+
+        InputError: another mesh, or `work_to_heat` in one run only.
+        """
         matching = partial(matching_rows, tolerance=1e-9 * np.abs(data["points"]).max(),
                            message="the temperature history belongs to another mesh")
         rows = matching(self._body.points, data["points"])
@@ -282,8 +291,10 @@ class CoolingHistory:
     def transfer(self, source: CoolingHistory, variables: HeatState, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> HeatState:
         """Interpolate a state of the heat equation from the history `source` on another mesh to this one.
+
         The material histories must have been transferred before: they give the heat of dissipated work. mapping: from
-        reference points there, shape (n, 2), to points here."""
+        reference points there, shape (n, 2), to points here.
+        """
         comm, before = self._problem.comm, variables.before
         to_body = MovingLeastSquares(comm, mapping(source._body.points), self._body.points).fitted
         touched = (zip(source._body.tool_contacts, variables.tool_excess, strict=True)
@@ -330,7 +341,9 @@ def _set_conductances(body: Any, tool_contacts: Sequence[tuple[Any, Any, np.ndar
 
 def _finer_elements(scene: Any, times: float, duration: float) -> str:
     """Return advice on element sizes that reduce the error `times` (of third order in the size), or "" if unknown.
-    `duration` is the time during which heat has penetrated; it gives the depth of the thin elements."""
+
+    `duration` is the time during which heat has penetrated; it gives the depth of the thin elements.
+    """
     laws = {law.on for law in [*scene.heat.boundaries, *scene.heat.contacts_with_tools(scene)]}
     faces = [face for face in ("bottom", "top") if face in laws]
     if not faces or len(scene.mesh.layers) > 1:

@@ -29,8 +29,10 @@ _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 
 def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
     """Cut the elements of a mesh into thin layers below faces that exchange heat; collective.
+
     `depths` are penetration depths at the first and last time, length, in positions `moved` (n, 2). Thin or curved
-    elements stay."""
+    elements stay.
+    """
     grid = gathered(mesh)
     cuts = _cuts(grid, depths, moved(grid.points) if moved else grid.points)
     try:
@@ -41,7 +43,9 @@ def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callab
 
 def graded(mesh: Mesh, faces: Sequence[str], part: float, depth: float) -> list[float]:
     """Return relative sizes of layers that grow by 1.26 with the distance from the faces, bottom up; collective.
-    The first is at most `part` of the present element and `_LAYER_THICKNESS` times the penetration depth (length)."""
+
+    The first is at most `part` of the present element and `_LAYER_THICKNESS` times the penetration depth (length).
+    """
     grid = gathered(mesh)
     heights, lengths, area = zip(*(_boundary_sizes(grid, face) for face in faces))
     thinnest, longest = min([_LAYER_THICKNESS * depth, *(part * height for height in heights)]), max(lengths)
@@ -68,8 +72,10 @@ def _boundary_sizes(grid: Grid, face: str) -> tuple[float, float, float]:
 def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
           points: np.ndarray) -> dict[tuple[int, int], np.ndarray]:
     """Return {(first, last): cuts} of edges, which divide elements below heated or cooled faces into thin layers.
+
     Keys are node numbers, the first of smaller (R, Z); cuts increase from 0 to 1. Depths are measured at `points`,
-    shape (n, 2), length."""
+    shape (n, 2), length.
+    """
     if not depths:
         return {}
     below = np.array([_distance_from_edges(points, grid.boundaries[name][:, :2]) for name in depths])
@@ -93,7 +99,9 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
 
 def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
     """Return the distance of n points, shape (n, 2), from the nearest straight edge, shape (n,), length.
-    Edges are pairs of node numbers, shape (m, 2)."""
+
+    Edges are pairs of node numbers, shape (m, 2).
+    """
     away = np.full(len(points), np.inf)
     for a, b in points[edges]:
         along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)
@@ -110,6 +118,7 @@ def _ordered(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 class _Nodes:
     """Nodes of a grid whose elements are cut into layers: the old nodes, and new ones on cut edges and in triangles.
+
     Cuts are {(first, last): positions from 0 to 1} for the node numbers of the ends of an edge.
 
     Attributes:
@@ -124,7 +133,9 @@ class _Nodes:
 
     def edge_nodes(self, a: int, b: int, curve: np.ndarray) -> tuple[list[int], np.ndarray]:
         """Return numbers and positions, 0 at node a to 1 at b, of the nodes along an edge, with new nodes at its cuts.
-        `curve` has the ends of the edge, and its middle if it is quadratic, shape (2 or 3, 2), length."""
+
+        `curve` has the ends of the edge, and its middle if it is quadratic, shape (2 or 3, 2), length.
+        """
         forward = bool(_ordered(self._old, np.array([[a, b]]))[0, 0] == a)
         key = (a, b) if forward else (b, a)
         places = np.concatenate([[0.0], self._cuts.get(key, np.zeros(0)), [1.0]])

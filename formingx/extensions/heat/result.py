@@ -339,8 +339,10 @@ class HeatRun:
 
     def _state_at(self, time: float | None) -> list[np.ndarray]:
         """Return the temperatures of body and tools at a time, as an entry of `states`; None: the end of the run.
+
         Between accepted states Hermite's cubic is used, with slopes of parabolas through neighbours. A time outside the
-        run is an InputError."""
+        run is an InputError.
+        """
         times = self._times
         t = times[-1] if time is None else finite("time", time)
         near = 1e-12 * times[-1]
@@ -358,8 +360,10 @@ class HeatRun:
 
     def _slope(self, k: int) -> list[np.ndarray]:
         """Return the time derivatives of the temperatures in state k, degrees per time, with the shapes of `states[k]`.
+
         They are slopes of the parabola through it and its two neighbours (at an end the nearest three), or of the chord
-        of two states."""
+        of two states.
+        """
         i = min(max(k, 1), len(self._times) - 2)
         if i < 1:
             return [(b - a) / (self._times[1] - self._times[0]) for a, b in zip(*self.states[:2])]
@@ -377,7 +381,9 @@ class HeatRun:
 
     def _first_time_inside(self, excess: Any, times: list[float], from_time: float | None = None) -> float | None:
         """Return the first time at which the function `excess` of time is 0 or negative; None if there is none.
-        The sign is examined at `times`, and from `from_time` on; the root between two of them is computed."""
+
+        The sign is examined at `times`, and from `from_time` on; the root between two of them is computed.
+        """
         from scipy.optimize import brentq
         before = from_time
         for t in times:

@@ -98,9 +98,11 @@ def heat(mesh: Mesh, materials: ThermalProperties | Mapping[str, ThermalProperti
 
 def _depths(materials: Mapping[str, ThermalProperties], boundaries: Sequence[Any],
             times: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return {boundary: (smallest, largest) penetration depth of heat, length}, sqrt(a t) with diffusivity a. The
-    smallest has the first output time, at least `_FIRST_ACCURATE_TIME` of the last. Absorption limits it to 1 /
-    absorption coefficient."""
+    """Return {boundary: (smallest, largest) penetration depth of heat, length}, sqrt(a t) with diffusivity a.
+
+    The smallest has the first output time, at least `_FIRST_ACCURATE_TIME` of the last. Absorption limits it to 1 /
+    absorption coefficient.
+    """
     slowest = min(material.diffusivity for material in materials.values())
     fastest = max(material.diffusivity for material in materials.values())
     first = np.sqrt(slowest * min(times[0], _FIRST_ACCURATE_TIME * times[-1]))
@@ -136,7 +138,9 @@ class _Displacement:
 
 def _set_initial_temperature(body: Conduction, start: Any, unit: str) -> None:
     """Set the initial temperature `T` of a body; raise an InputError if it is below absolute zero or in another unit.
-    start: initial temperature, as the argument of `heat`."""
+
+    start: initial temperature, as the argument of `heat`.
+    """
     if getattr(start, "unit", unit) != unit:
         raise InputError(f"heat: start: is in {start.unit!r}, this run in {unit!r}: must be in the same unit")
     T = fields.values_at(start, body.points, body.mesh, "heat: start")
@@ -150,7 +154,9 @@ def _set_initial_temperature(body: Conduction, start: Any, unit: str) -> None:
 
 def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: float, max_steps: int) -> None:
     """Integrate from time 0 to the last output time, and record the accepted steps in the run.
-    `tolerance` is the estimated error of a step, degrees. Too short or too many steps raise a ConvergenceError."""
+
+    `tolerance` is the estimated error of a step, degrees. Too short or too many steps raise a ConvergenceError.
+    """
     state, t, dt = run.states[0], 0.0, 1e-3 * outputs[0]
     for end in outputs:
         while t < end:
@@ -173,7 +179,9 @@ def _advance(run: HeatRun, body: Conduction, outputs: np.ndarray, tolerance: flo
 
 def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
     """Set the discretisation errors of a run at its output times, and warn if they are large; frees the estimator.
-    Large is above `tolerance`, degrees, and above `WARNED_ERROR` times the span of temperatures in the run."""
+
+    Large is above `tolerance`, degrees, and above `WARNED_ERROR` times the span of temperatures in the run.
+    """
     try:
         run.errors_in_space = np.array([estimator.largest(run.states[k], run.times[k])[0]
                                         for k in np.searchsorted(run.times, run.outputs)])
@@ -190,7 +198,9 @@ def _check_error(run: HeatRun, estimator: SpaceError, tolerance: float) -> None:
 
 def implausible_diffusivities(materials: Iterable[ThermalProperties], length: float) -> Iterator[str]:
     """Yield a text for each diffusivity outside 1e-8 to 1e-5 m2/s, in every unit that suits the length of the body.
-    Lengths may be in m, cm, mm, um or in, if the body is then from 0.1 mm to 20 m long."""
+
+    Lengths may be in m, cm, mm, um or in, if the body is then from 0.1 mm to 20 m long.
+    """
     metres = np.array([1.0, 1e-2, 1e-3, 1e-6, 0.0254])
     metres = metres[(length * metres > 1e-4) & (length * metres < 20)]
     for value in sorted({material.diffusivity for material in materials}):
@@ -203,7 +213,9 @@ def implausible_diffusivities(materials: Iterable[ThermalProperties], length: fl
 def implausible_radiation(materials: Iterable[ThermalProperties], boundaries: Iterable[Any], thickness: float,
                            zero: float) -> Iterator[str]:
     """Yield a text for each radiation that heats a face far faster than conduction cools it, as in mixed units.
-    Between a heater of 1000 K and 2 mm of a polymer the Biot number is about 2."""
+
+    Between a heater of 1000 K and 2 mm of a polymer the Biot number is about 2.
+    """
     conductivity = min(material.conductivity for material in materials)
     for law in boundaries:
         if isinstance(law, Radiation):
@@ -218,7 +230,9 @@ def implausible_radiation(materials: Iterable[ThermalProperties], boundaries: It
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
     """Return {layer: `ThermalProperties`} from the argument of a user, one for all layers or by layer.
-    A layer without properties or another type is an InputError."""
+
+    A layer without properties or another type is an InputError.
+    """
     if isinstance(materials, ThermalProperties):
         materials = dict.fromkeys(mesh.layers, materials)
     if not isinstance(materials, Mapping):
@@ -234,8 +248,10 @@ def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties
 
 def checked_boundaries(mesh: Mesh, boundaries: Any, absolute_zero: float) -> list[Any]:
     """Return the checked laws of faces and heat sources that a user gave.
+
     An InputError names an unknown law, boundary, a temperature below absolute zero, a table too short, or a second law
-    on a fixed face."""
+    on a fixed face.
+    """
     found = as_list("heat: boundaries", boundaries, "boundaries, such as Convection('top', h=40, air=20)")
     prescribed = [b.on for b in found if isinstance(b, FixedTemperature)]
     for boundary in found:

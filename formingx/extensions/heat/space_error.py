@@ -19,7 +19,9 @@ from .contact import HeatContact
 
 class SpaceError:
     """Estimator of the discretisation error of the temperatures of a body with quadratic elements.
-    `body` is its heat equation, `finer` the same one with cubic elements, which `destroy` frees."""
+
+    `body` is its heat equation, `finer` the same one with cubic elements, which `destroy` frees.
+    """
 
     def __init__(self, body: Conduction, finer: Conduction):
         self._body, self._finer = body, finer
@@ -27,7 +29,9 @@ class SpaceError:
 
     def largest(self, state: list[np.ndarray], time: float) -> tuple[float, np.ndarray]:
         """Estimate the largest error of the temperature, degrees, and its reference position, shape (2,); collective.
-        The error is the largest nodal value of a correction e of cubic elements, (M + t K) e = t (R(T) - M dT/dt)."""
+
+        The error is the largest nodal value of a correction e of cubic elements, (M + t K) e = t (R(T) - M dT/dt).
+        """
         body, finer = self._body, self._finer
         slope = body.slope(body.rates(state)[0][0])
         in_tools = [self._face_temperatures(*each)
@@ -51,8 +55,10 @@ class SpaceError:
 
     def _face_temperatures(self, touch: HeatContact, finer: HeatContact, excess: np.ndarray) -> np.ndarray:
         """Return excess temperatures of the tool below the k nodes of cubic elements, shape (k, m), degrees.
+
         Column 0 is interpolated from `excess` of the quadratic elements; the others, without effect on the body, are
-        0."""
+        0.
+        """
         found = np.zeros((len(finer.dofs), excess.shape[1]))
         if touch.conducts:
             values = np.zeros(len(self._body.points))
@@ -62,7 +68,9 @@ class SpaceError:
 
     def _in_cubic_space(self, own: np.ndarray) -> np.ndarray:
         """Return the nodal values of a function in the space of cubic elements, locally owned entries, shape (k,).
-        own: its nodal values in the space of quadratic elements, locally owned entries, shape (n,)."""
+
+        own: its nodal values in the space of quadratic elements, locally owned entries, shape (n,).
+        """
         self._values.x.array[: len(own)] = own
         self._values.x.scatter_forward()
         self._cubic_values.interpolate(self._values)

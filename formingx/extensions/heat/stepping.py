@@ -37,7 +37,9 @@ class Step(NamedTuple):
 
 def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
     """Take one time step of the heat equation by TR-BDF2 from a temperature state (see `Conduction`).
-    The error is infinite if Newton's method found no solution."""
+
+    The error is infinite if Newton's method found no solution.
+    """
     c = dt * _D
     first, heats_first = body.rates(state)
     try:

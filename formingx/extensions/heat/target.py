@@ -25,7 +25,9 @@ _NEAR = 1e-4
 
 class PointTemperature(Quantity):
     """Temperature of a material point, as an output quantity.
-    At a trial state the heat equation is solved from the last accepted state, with the body at the trial state."""
+
+    At a trial state the heat equation is solved from the last accepted state, with the body at the trial state.
+    """
 
     size, smooth = 1.0, False
 
@@ -61,7 +63,9 @@ class PointTemperature(Quantity):
 
     def _crossing(self, target: float, last: float, control: float) -> float:
         """Return the time at which the temperature is the target, by regula falsi from the last accepted state on.
-        If the temperature does not reach the target, it is a time far ahead."""
+
+        If the temperature does not reach the target, it is a time far ahead.
+        """
         before = self._crossed[1] - last if self._crossed else 0.0
         a, b = last, last + max(before, self._short)
         fa, fb = self._at(a, control) - target, self._at(b, control) - target

@@ -16,6 +16,7 @@ from ...ranks import combined
 
 class HeatVectors:
     """Assembly of vectors of the heat equation M dT/dt = R(T); the subclass `Conduction` sets the attributes.
+
     Entries of M and R are divided by `capacity`, so that M sums to 1 and R is in degrees per time.
 
     Attributes:

@@ -186,7 +186,9 @@ class SoskeyWinter(Damping):
 
 def _exponential(alpha: float, terms: list[tuple[float, float]], I1: Any, I2: Any) -> tuple[Any, Any, Any]:
     """Return the damping h as a sum of exponentials f exp(-n s), and its derivatives dh/dI1 and dh/dI2.
-    The strain s is sqrt(alpha I1 + (1 - alpha) I2 - 3) with I1 = tr B, I2 = tr B^-1 of the Finger tensor B."""
+
+    The strain s is sqrt(alpha I1 + (1 - alpha) I2 - 3) with I1 = tr B, I2 = tr B^-1 of the Finger tensor B.
+    """
     s = np.sqrt(np.maximum(alpha * I1 + (1 - alpha) * I2 - 3, 0))
     each = [f * np.exp(-n * s) for f, n in terms]
     slope = -sum(n * h for (_, n), h in zip(terms, each)) / (2 * np.maximum(s, _MIN_ROOT))

@@ -32,7 +32,8 @@ class MemoryIntegral:
     S is the second Piola-Kirchhoff stress up to a pressure, W_k the weight of past state k, h the damping function.
     Tensors at n points are stored as entries 11, 22, 12, 33, shape (4, n). Cbar = J^(-2/3) C. `spectrum` is a list of
     (G, tau), stress and time; without a `damping`, h = 1. It is `irreversible` if h of a past state never increases,
-    and `shifted` if the reduced time depends on the temperature."""
+    and `shifted` if the reduced time depends on the temperature.
+    """
 
     coefficients = {"past_S": (0.0,) * 4, "past_C": (1.0, 1.0, 0.0, 1.0), "past_D": ((0.0,) * 4,) * 4,
                     "past_T": (0.0,) * 4}
@@ -51,7 +52,9 @@ class MemoryIntegral:
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
         """Return the weights w of K past states in the stress for modes of modulus 1, shape (K, modes[, n]).
-        Ages in reduced time descend to 0, shape (K,), or (K, n) if they differ between n points."""
+
+        Ages in reduced time descend to 0, shape (K,), or (K, n) if they differ between n points.
+        """
         x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
         step, young = x[:-1] - x[1:], np.exp(-x[1:])
         mean = _mean_decay(step)
@@ -70,9 +73,11 @@ class MemoryIntegral:
     def weights_after(self, weights: np.ndarray, step: Any, last_step: Any = 0.0,
                       allowed: Any = 1.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the weights W of K past states after a step in reduced time, stress, and their slopes by its length.
+
         The stress is the sum of W h Cbar_k^-1; results have shape (K, n) or (K, 1), the given weights (K, modes[, n]).
         They are exact for a parabola of h Cbar_k^-1 in time, so long steps are of second order too. Steps are numbers
-        or (n,); without `last_step`, or where `allowed` is 0, it is linear."""
+        or (n,); without `last_step`, or where `allowed` is 0, it is linear.
+        """
         each = weights.ndim == 3
         y = np.atleast_1d(step) / self.tau[:, None]                         # (modes, n or 1)
         decay, G = np.exp(-y), self.modulus[:, None]
@@ -98,8 +103,10 @@ class MemoryIntegral:
     def inverses_and_damping(self, C: np.ndarray, past: np.ndarray,
                              smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
         """Return Cbar_k^-1 of K past states, shape (K, 4, n), damping h, and dh/dI1 and dh/dI2, shape (K, n) each.
+
         Tensors have the entries 11, 22, 12, 33: C (4, n), `past` (K, 4, n). `smallest_h`, shape (K, n), bounds h; None:
-        no bound."""
+        no bound.
+        """
         inverse = _inverse(past)
         if self.damping is None:
             ones = np.ones((len(past), C.shape[1]))
@@ -115,7 +122,9 @@ class MemoryIntegral:
     def stress(self, C: np.ndarray, past: np.ndarray, W: np.ndarray, slope: np.ndarray,
                smallest_h: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the stress S without pressure, shape (4, n), dS/dCbar, shape (4, 4, n), and dS/dt, shape (4, n).
-        C has shape (4, n), `past` (K, 4, n), W and its slope by t (K, n) or (K, 1), the bound of damping (K, n)."""
+
+        C has shape (4, n), `past` (K, 4, n), W and its slope by t (K, n) or (K, 1), the bound of damping (K, n).
+        """
         inverse, h, h1, h2 = self.inverses_and_damping(C, past, smallest_h)
         S, T = (np.einsum("kn,kin->in", np.broadcast_to(w, h.shape) * h, inverse) for w in (W, slope))
         if self.damping is None:
@@ -134,7 +143,8 @@ class MemoryIntegral:
 
         S is linearised about the state of the last refresh, with the isochoric right Cauchy-Green tensor Cbar_0 and the
         time step dt_0. There T = dS/dt and D = dS/dCbar, and S_0 is S - T dt_0. The present ones are Cbar and Delta t.
-        The coefficients (UFL) are "past_S" for S_0, "past_C" for Cbar_0, "past_D" for D and "past_T" for T."""
+        The coefficients (UFL) are "past_S" for S_0, "past_C" for Cbar_0, "past_D" for D and "past_T" for T.
+        """
         S, D, T = (coefficients[name] for name in ("past_S", "past_D", "past_T"))
         change = _change(C, coefficients)
         linear = sum((S[i] + T[i] * time_step) * C[i] for i in range(4))
@@ -147,7 +157,8 @@ class MemoryIntegral:
 
         Cbar_0 is the isochoric right Cauchy-Green tensor at the last refresh, about which the stress S is linearised.
         There the work is 0. The coefficients (UFL) are "past_C" for Cbar_0 and "past_D" for D; C and dC have the
-        entries 11, 22, 12, 33."""
+        entries 11, 22, 12, 33.
+        """
         D, change = coefficients["past_D"], _change(C, coefficients)
         return sum((D[i, j] - D[j, i]) * change[j] * dC[i] for i in range(4) for j in range(4)) / 4
 
@@ -177,13 +188,15 @@ def _mean_decay_slope(x: np.ndarray) -> np.ndarray:
 
 def _parabola_factors(s: Any) -> tuple[Any, Any, Any]:
     r"""Return the factors of the three states that fix a parabola in time, shape of s each.
+
     At a fraction t of the step, from 0 to 1, the parabola deviates from its chord by
 
     .. math:: -t (1 - t) \left(f y_1 - f (1 + s) y_0 + f s y_{-1}\right), \qquad f = \frac{s}{1 + s}
 
     with the values y_1 at the end of the step, y_0 at its start and y_-1 at the start of the previous step. The results
     are f, f (1 + s) and f s. For s from 2 to 4 all three are reduced gradually to 0, since BDF2 is unstable for long
-    steps. s is the length of the step over the length of the previous one."""
+    steps. s is the length of the step over the length of the previous one.
+    """
     s = np.minimum(s, 4.0)
     share = np.minimum(1.0, 2 - s / 2) * s
     return share / (1 + s), share, share * s / (1 + s)
@@ -205,8 +218,10 @@ def _quadratic_weight(x: np.ndarray) -> np.ndarray:
 
 
 def _quadratic_weight_slope(x: np.ndarray) -> np.ndarray:
-    """Return the derivative of [x - 2 + (x + 2) e^-x]/x^2 by x. x: length of the step over the relaxation time, any
-    shape, as of the result."""
+    """Return the derivative of [x - 2 + (x + 2) e^-x]/x^2 by x, in the shape of x.
+
+    x: length of the step over the relaxation time.
+    """
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = 1 / 6 - x / 6 + 3 * x**2 / 40 - x**3 / 45 + 5 * x**4 / 1008

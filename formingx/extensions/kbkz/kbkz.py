@@ -232,7 +232,9 @@ class KBKZ(RelaxingMaterial):
 
     def _biaxial(self, l: np.ndarray) -> np.ndarray:
         """Return the nominal stresses in both directions after a sudden biaxial stretch, shape (2, ...).
-        l: the two stretches, shape (2, ...)."""
+
+        l: the two stretches, shape (2, ...).
+        """
         if l.shape[:1] != (2,) or not np.all((l > 0) & np.isfinite(l)):
             raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), each above 0")
         squares = np.stack([*l**2, 1 / (l[0] * l[1])**2])
@@ -262,7 +264,9 @@ class KBKZ(RelaxingMaterial):
 
     def _true_stress(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
         """Return the true stress tau_1 - tau_3 of a test at the last of its times, without the equilibrium.
-        Times and stretches have shape (n,); `between` them, "stretch" or "strain" has a constant rate."""
+
+        Times and stretches have shape (n,); `between` them, "stretch" or "strain" has a constant rate.
+        """
         now, last = times[-1], stretches[-1]
         modulus, tau = np.array(self.spectrum).T
         initial = self._modulus(now - times[0]) * self._damped_difference(mode, last)
@@ -275,7 +279,9 @@ class KBKZ(RelaxingMaterial):
 
     def _panel_ends(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
         """Return the ends of the quadrature panels of the memory integral, as ascending ages, shape (k,), time.
-        An age is the time from an instant of the test to the last of its times, shape (n,)."""
+
+        An age is the time from an instant of the test to the last of its times, shape (n,).
+        """
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANEL_AGE_RATIO)) + 1)
         ages = [np.array([0, whole]), shortest / 2 * _PANEL_AGE_RATIO ** np.arange(count), times[-1] - times]

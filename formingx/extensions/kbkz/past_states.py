@@ -53,7 +53,9 @@ class StoredStates(NamedTuple):
 
 class PastStates:
     """Past states of one material in a run, as a `formingx.forms.history.History`.
-    `refresh` updates the coefficients of the stress in the forms."""
+
+    `refresh` updates the coefficients of the stress in the forms.
+    """
 
     rate_dependent = True
 
@@ -117,7 +119,9 @@ class PastStates:
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
         """Add the present state of the forms to the past states, and drop states without effect on the stress.
-        The control gives the time; x and `start` are not used."""
+
+        The control gives the time; x and `start` are not used.
+        """
         (C, step, _), variables = self._present(), self._stored
         states = [*variables.states, PastState(variables.states[-1].reduced_time + step, C)]
         smallest_h = variables.smallest_h
@@ -136,8 +140,10 @@ class PastStates:
     def transfer(self, source: PastStates, variables: StoredStates, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
         """Return the past states of a run on another mesh, interpolated to this mesh; collective.
+
         `mapping` takes reference points of the other mesh, shape (n, coordinates), to this mesh. x and control are not
-        used."""
+        used.
+        """
         interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
         F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
 
@@ -158,8 +164,10 @@ class PastStates:
 
     def _indices_to_keep(self, states: list[PastState], C: np.ndarray, smallest_h: np.ndarray | None) -> list[int]:
         """Return the indices of the past states that cannot be interpolated from their neighbours; collective.
+
         The last of the K states is the present one. Cbar has shape (4, n), the bound `smallest_h` of damping (K, n) or
-        None."""
+        None.
+        """
         if len(states) < 5:
             return list(range(len(states)))
         times, past = np.array([s.reduced_time for s in states]), np.array([s.C for s in states])
@@ -186,7 +194,9 @@ class PastStates:
 
     def _present(self) -> tuple[np.ndarray, Any, Any]:
         """Return the present Cbar = J^(-2/3) C, shape (4, n), reduced time since the last state, and its rate.
-        The entries are 11, 22, 12, 33. Times are numbers, or have the shape (n,) if they depend on the temperature."""
+
+        The entries are 11, 22, 12, 33. Times are numbers, or have the shape (n,) if they depend on the temperature.
+        """
         step: Any = self._forms.time_now - self._stored.time
         rate: Any = 1.0
         if not len(self._own):
@@ -228,7 +238,9 @@ class PastStates:
 
     def load(self, data: dict[str, Any]) -> StoredStates:
         """Return the past states of this rank for `put`, from the result of `save`.
-        Data of another mesh or another material are an InputError."""
+
+        Data of another mesh or another material are an InputError.
+        """
         numbers = np.array(data.get("cells", []), dtype=np.int64)
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = [(np.array(s["reduced_time"], float), np.array(s["C"], float)) for s in data.get("states", [])]

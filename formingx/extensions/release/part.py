@@ -11,8 +11,10 @@ _EDGES = ((0, 1), (1, 2), (2, 0))
 
 def trimmed_mesh(mesh: Mesh, line: np.ndarray, segments: int) -> Mesh:
     """Return the elements of a mesh along the first segments of a polyline (n, 2) through the body; collective.
+
     A boundary that vanishes, such as the rim, moves to the cut edges, else named "trim". A layer without elements is an
-    InputError."""
+    InputError.
+    """
     grid = gathered(mesh)
 
     def part() -> Grid:
@@ -49,7 +51,9 @@ def _part_of_grid(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
 
 def _boundary_edges(triangles: np.ndarray) -> dict[frozenset[int], list[int]]:
     """Return {set of both end nodes: [first, last, middle node]} of the edges that belong to one triangle only.
-    triangles: node numbers, shape (m, 3) or (m, 6); without midpoints the lists have no middle."""
+
+    triangles: node numbers, shape (m, 3) or (m, 6); without midpoints the lists have no middle.
+    """
     found: dict[frozenset[int], list[list[int]]] = {}
     for row in ([int(node) for node in nodes] for nodes in triangles):
         for k, (i, j) in enumerate(_EDGES):

@@ -166,7 +166,9 @@ def springback(path: Path, temperature: float | None = None, *, trim: Any = None
 def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, trimmed: float,
          units: Units) -> Springback:
     """Release a part, then let it cool or relax for `cooling_time`, and return its shape before and after.
-    The owned unknowns x are those of the part in its tools. Its end there has the radius `trimmed`, length."""
+
+    The owned unknowns x are those of the part in its tools. Its end there has the radius `trimmed`, length.
+    """
     stages = [Stage("release"), *([Stage("cool", duration=cooling_time)] if cooling_time else [])]
     record = Record(problem, Curve(problem, Tolerances()))
     path = Path(record, True)
@@ -183,8 +185,10 @@ def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, 
 
 def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any, wall: Wall) -> tuple[Any, float]:
     """Return the `Cooling` of the released part (or None without heat), and the duration of its cooling or relaxation.
+
     Faces get a temperature after the release or laws {boundary: temperature}; None is the default. Arguments that do
-    not fit the scene are an InputError."""
+    not fit the scene are an InputError.
+    """
     if scene.heat is None:
         if temperature is not None or boundaries is not None:
             raise InputError("Path.springback: temperature: the scene has no heat=Cooling(...) that could change it:"
@@ -206,7 +210,9 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
 
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
     """Return the scene of the part alone, constrained on its symmetry planes and against rigid motion.
-    `heat` is the `Cooling` after the release, or None."""
+
+    `heat` is the `Cooling` after the release, or None.
+    """
     symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
     supports: list[Support] = [*symmetries]
     constrained = {s.component for s in symmetries}
@@ -224,7 +230,9 @@ def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
 
 class _FixedComponent(PinnedNode):
     """Constraint of one displacement component of a node against rigid motion; a free body exerts no force on it.
-    The component is 0 for radial and 1 for axial; the node has a reference position, shape (2,), length."""
+
+    The component is 0 for radial and 1 for axial; the node has a reference position, shape (2,), length.
+    """
 
     def __init__(self, component: int, point: np.ndarray):
         super().__init__(*point)

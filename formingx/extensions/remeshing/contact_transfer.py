@@ -52,8 +52,10 @@ class ContactState(NamedTuple):
 
     def outward_motion(self, x: np.ndarray, d: np.ndarray) -> np.ndarray:
         """Return the outward motions of new points from signed gaps d, shape (n,), to the depth of the old face.
+
         Between old contact points the depth is interpolated; elsewhere points move to the surface or an old neighbour's
-        depth. Negative is into the tool, length."""
+        depth. Negative is into the tool, length.
+        """
         pair, share = self._nearest_pairs(x)
         both = self.touches[pair]
         share = np.where(both.all(1), share, np.where(both[:, 0], 0.0, 1.0))
@@ -77,8 +79,10 @@ class ContactState(NamedTuple):
 
 def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, control: float) -> None:
     """Transfer the pressure and friction per present area of a face to the same face on the new mesh, in place.
+
     The distance of each contact point is offset, so that the contact law gives this pressure at any depth in the
-    tool."""
+    tool.
+    """
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)
     theta, d = law.theta, face.contact.tool.signed_distance(x)

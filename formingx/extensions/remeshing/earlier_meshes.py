@@ -44,7 +44,9 @@ class MaterialPointProbe(Probe):
 
 def original_positions(state_transfer: Any, points: np.ndarray) -> np.ndarray:
     """Map points of a new mesh, shape (n, 2), length, back to their positions on the first mesh of the run.
-    They are interpolated from the nodes of the old mesh, in the deformed body."""
+
+    They are interpolated from the nodes of the old mesh, in the deformed body.
+    """
     old, state = state_transfer.before
     nodes = node_positions(old.forms.domain)
     first = nodes if old.scene.state_transfer is None else original_positions(old.scene.state_transfer, nodes)
@@ -54,7 +56,9 @@ def original_positions(state_transfer: Any, points: np.ndarray) -> np.ndarray:
 
 def scene_on_new_mesh(mesh: Any, state_transfer: Any) -> Any:
     """Return a scene on a new mesh of the deformed body, with materials and items of `StateTransfer.before`.
-    The last temperature on the old mesh becomes the initial one."""
+
+    The last temperature on the old mesh becomes the initial one.
+    """
     old, state = state_transfer.before
     if old.temperature is None:
         return old.scene.with_mesh(mesh, state_transfer)
@@ -108,8 +112,10 @@ class _OutlineProjection:
 
     def _closest(self, x: np.ndarray, edge: np.ndarray, s: np.ndarray, fixed: bool = False) -> tuple[np.ndarray, ...]:
         """Return the closest points on given edges: parameter, shape (n, 1), offset and outer normal, shape (n, 2).
+
         The points x have shape (n, 2), length. The guesses s go from 0 at the start of an edge to 1; `fixed` keeps
-        them."""
+        them.
+        """
         a, b, middle = np.moveaxis(self._edges[edge], 1, 0)
         s, bend = s[:, None], 2 * (a + b - 2 * middle)
         for _ in range(0 if fixed else 4):                   # Newton's method for the closest point on the parabola

@@ -17,7 +17,9 @@ from .earlier_meshes import scene_on_new_mesh
 
 def save(problem: Any) -> dict[str, Any]:
     """Return the data of a checkpoint of a mesh of a remeshed run, from which `load` makes a problem; on one rank.
-    Nodes and cells keep the order in which the mesh was made."""
+
+    Nodes and cells keep the order in which the mesh was made.
+    """
     mesh = problem.scene.mesh
     grid, nodes = gathered(mesh), np.asarray(mesh.domain.geometry.input_global_indices, dtype=np.int64)
     number = mesh.domain.topology.original_cell_index
@@ -33,7 +35,9 @@ def save(problem: Any) -> dict[str, Any]:
 
 def load(before: tuple[Problem, State], data: dict[str, Any], state_transfer: Callable[..., Any]) -> Problem:
     """Return the problem on a mesh that was made during a run, from its data and (problem, last state) before it.
-    Several ranks, or a mesh that gets another numbering than in the run, are an InputError."""
+
+    Several ranks, or a mesh that gets another numbering than in the run, are an InputError.
+    """
     scene = before[0].scene
     if scene.mesh.comm.size > 1:
         raise InputError("load: a remeshed run can be loaded on one rank only")

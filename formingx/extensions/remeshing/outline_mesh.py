@@ -22,10 +22,12 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
              layer: str, axisymmetric: bool, comm: Any, volume: float | None = None,
              outside: Callable[[np.ndarray, frozenset[str]], np.ndarray] = lambda points, names: points) -> Mesh:
     """Return a mesh of six-node triangles inside an outline, with second-order geometry along it; on one rank.
+
     Edges, counter-clockwise, have ends and midpoint, shape (m, 3, 2), length, each with the `names` of its boundaries.
     Elements have `size`, and `corner` at `corners`, shape (k, 2). R is scaled to give `volume` (length^3, or length^2
     in plane strain). `outside` moves new outline points, shape (n, 2), out of tools. A crossing outline, or no mesh by
-    gmsh, is an InputError."""
+    gmsh, is an InputError.
+    """
     turns = [k for k in range(len(edges)) if names[k] != names[k - 1] or (corners == edges[k, 0]).all(1).any()] or [0]
     ends, middles, named = [], [], []
     for first, last in zip(turns, [*turns[1:], turns[0] + len(edges)]):
@@ -89,7 +91,9 @@ def mesh_of_outline(edges: np.ndarray, names: Sequence[frozenset[str]], corners:
 
 def enclosed_volume(edges: np.ndarray, axisymmetric: bool) -> float:
     """Return the exact volume of revolution, length^3, or area, inside a closed outline of parabolic edges.
-    Edges have first end, second end and midpoint, in counter-clockwise order, shape (m, 3, 2), length."""
+
+    Edges have first end, second end and midpoint, in counter-clockwise order, shape (m, 3, 2), length.
+    """
     xi, weights = np.polynomial.legendre.leggauss(4)
     s = (1 + xi) / 2
     shapes = np.column_stack([(1 - s) * (1 - 2 * s), s * (2 * s - 1), 4 * s * (1 - s)])
@@ -100,8 +104,10 @@ def enclosed_volume(edges: np.ndarray, axisymmetric: bool) -> float:
 
 def without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.ndarray:
     """Return the edges of the outline, shape (m, 3, 2), with shallow pockets between body and tool closed.
+
     Nodes between two contact nodes, `touched` (k, 2), move onto the line of these if all are within `depth` of it,
-    length."""
+    length.
+    """
     nodes, n = edges[:, [0, 2]].reshape(-1, 2).copy(), 2 * len(edges)
     close = 1e-6 * np.ptp(nodes, axis=0).max()
     on = np.flatnonzero(np.linalg.norm(nodes[:, None] - touched[None], axis=2).min(1, initial=np.inf) < close)
@@ -116,8 +122,10 @@ def without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.
 def refined_points(edges: np.ndarray, names: list[frozenset[str]],
                     touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
     """Return the points of the outline that get small elements, shape (k, 2), length.
+
     These are the corners between two boundaries with contacts, and the ends of contact areas: `touched` has (boundary,
-    positions (n, 2)) of each contact."""
+    positions (n, 2)) of each contact.
+    """
     faces = {on for on, _ in touched}
     found = []
     pressed, close = np.zeros(len(edges), dtype=bool), 1e-6 * np.ptp(edges[:, 0], axis=0).max()
@@ -134,8 +142,10 @@ def refined_points(edges: np.ndarray, names: list[frozenset[str]],
 
 def _nodes_along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes of new elements along a line of edges: ends, shape (n + 1, 2), and midpoints, shape (n, 2).
+
     Edges have shape (m, 3, 2); elements have `size`, and the size `corner` at the positions `corners`, shape (k, 2),
-    length."""
+    length.
+    """
     parameter = np.linspace(0, len(edges), FINE_PIECES * len(edges) + 1)
 
     def points_at(t: np.ndarray) -> np.ndarray:

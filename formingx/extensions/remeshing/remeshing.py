@@ -154,8 +154,10 @@ def _check(caller: str, scene: Any, targets: Sequence[Target]) -> None:
 def _run_with_remeshing(path: Any, remesh: Remesh, tolerances: Tolerances, part: Callable[[], None],
                         done: Callable[[], bool]) -> None:
     """Continue a run to its end, with a new mesh whenever the elements are too distorted; path in place.
+
     `part` runs on the last mesh until its end; `done` is True for a complete path. Otherwise a ConvergenceError is
-    raised."""
+    raised.
+    """
     record = path.record
     record.hooks.on_state.append(lambda state: _check_mesh(record, state, remesh))
     poor = bool(record.states) and _needs_remeshing(record, record.last, remesh)
@@ -197,7 +199,9 @@ def _not_reached(record: Record, error: ConvergenceError) -> ConvergenceError:
 
 def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
     """Remesh the body in the last state of a path, and add the first state on the new mesh to it, in equilibrium.
-    If no new mesh has an equilibrium, a ConvergenceError is raised."""
+
+    If no new mesh has an equilibrium, a ConvergenceError is raised.
+    """
     record, last = path.record, path.last
     stepping = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
     step = stepping["step"]
@@ -221,8 +225,10 @@ def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
 
 def _best_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> tuple[Segment, State]:
     """Return a new segment of a path: a new mesh of the body in its last state, and the equilibrium on it.
+
     Of several element sizes, the first, else the best, mesh with J far from the limits `Remesh.volume_ratio` is taken.
-    None in equilibrium raises a ConvergenceError."""
+    None in equilibrium raises a ConvergenceError.
+    """
     low, high = remesh.volume_ratio
     found, reason = [], ""
     for share in _SIZE_FACTORS:
@@ -252,8 +258,10 @@ def _volume_ratios(record: Record, state: State) -> tuple[float, float]:
 
 def _check_mesh(record: Record, state: State, remesh: Remesh) -> None:
     """End the run on the present mesh if J, the volume ratio since it was made, leaves `Remesh.volume_ratio`.
+
     In the first state on a new mesh (kind "remesh") the relative changes of force and strain energy are stored in
-    `State.jump`."""
+    `State.jump`.
+    """
     if state.kind == "remesh":
         before = record.segments[-2].states[-1].measures
         force = next((name for name in before if name.endswith("force")), None)
@@ -275,7 +283,9 @@ def _needs_remeshing(record: Record, state: State, remesh: Remesh) -> bool:
 
 def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -> tuple[Segment, State]:
     """Return a new segment of a path: a new mesh of the body in its last state, and the equilibrium on it.
-    `share` is the element size over the requested size."""
+
+    `share` is the element size over the requested size.
+    """
     record, old, state = path.record, path.problem, path.last
     scene = old.scene
     outline = Outline(old.forms)
@@ -320,8 +330,10 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
 
 def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
     """Return the unknowns in equilibrium at a control, from the transferred unknowns x, shape (n,), on a new mesh.
+
     Newton's method is tried first; then the unbalanced forces are reduced to zero as loads along `curve`. Failing both
-    is a ConvergenceError."""
+    is a ConvergenceError.
+    """
     first = problem.setting
     problem.x.array_w[:] = x
     try:
@@ -349,7 +361,9 @@ def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> 
 def _moved_out_of_tools(x: np.ndarray, names: frozenset[str],
                         contacts: list[tuple[Any, ContactState, np.ndarray]]) -> np.ndarray:
     """Return outline points x, shape (n, 2), moved out of tools to the depth of the old points beside them.
-    Contacts are (contact, contact state, travel of the tool (2,), length) of the boundaries `names`."""
+
+    Contacts are (contact, contact state, travel of the tool (2,), length) of the boundaries `names`.
+    """
     for contact, before, travel in contacts:
         if contact.contact.on in names:
             near = contact.contact.tool.nearest(x - travel)

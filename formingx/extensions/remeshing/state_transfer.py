@@ -121,8 +121,10 @@ class StateTransfer(NamedTuple):
 
     def _projected_fields(self, forms: Any) -> tuple[np.ndarray, np.ndarray]:
         """Return deformation (cells, 6, 6) and pressures (cells, 3, p) in new cells, by least squares in each.
+
         The deformation, at corners and midpoints, has rr, rz, zz and hoop entry of b = F F^T/J, then cosine and sine of
-        the rotation of F. Pressures, at corners, are dimensionless."""
+        the rotation of F. Pressures, at corners, are dimensionless.
+        """
         rule: Any = basix.make_quadrature(basix.CellType.triangle, _QUADRATURE_DEGREE)
         xi, weights = rule
         volume = forms.weight * abs(ufl.JacobianDeterminant(forms.domain))
@@ -146,7 +148,9 @@ class StateTransfer(NamedTuple):
     def _deformation_at(self, cells: np.ndarray, coordinates: np.ndarray,
                         axisymmetric: bool) -> tuple[np.ndarray, np.ndarray]:
         """Return b = F F^T/J with cosine and sine of the rotation of F, shape (n, 6), and J of old cells, shape (n,).
-        The four entries rr, rz, zz and hoop of b come first. Points have local coordinates, shape (n, 2)."""
+
+        The four entries rr, rz, zz and hoop of b come first. Points have local coordinates, shape (n, 2).
+        """
         x, reference, (shapes, *slopes) = self.x[cells], self.reference[cells], _tabulated(_POSITIONS, coordinates, 1)
         grad = np.einsum("dna,nai->nid", slopes, x) @ np.linalg.inv(np.einsum("dna,nai->nid", slopes, reference))
         r, R = (np.einsum("na,na->n", shapes, y[..., 0]) for y in (x, reference))
@@ -162,8 +166,10 @@ class StateTransfer(NamedTuple):
 
     def _find_cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the old cells, shape (n,), in which points (n, 2) of the deformed body lie, and local coordinates.
+
         Newton's method is used in the nearest cells. A point outside the body is placed on the edge of the nearest
-        element."""
+        element.
+        """
         from scipy.spatial import cKDTree
         inside = 0.9 * _LATTICE + 0.1 / 3
         tree = cKDTree(np.concatenate(_tabulated(_POSITIONS, inside)[0] @ self.x))
@@ -195,8 +201,10 @@ def _tabulated(element: Any, xi: np.ndarray, derivatives: int = 0) -> np.ndarray
 
 def _left_stretch(rr: Any, rz: Any, zz: Any, along: Any, turned: Any,
                   sqrt: Any) -> tuple[list[list[Any]], Any, Any, Any]:
-    """Return the left stretch V in the section (V^2 = b), cosine and sine of the rotation of F, and det V. The
-    interpolated cosine (`along`) and sine (`turned`) are divided by their length; `sqrt` is that of numbers or UFL."""
+    """Return the left stretch V in the section (V^2 = b), cosine and sine of the rotation of F, and det V.
+
+    The interpolated cosine (`along`) and sine (`turned`) are divided by their length; `sqrt` is that of numbers or UFL.
+    """
     area = sqrt(rr * zz - rz * rz)
     trace, length = sqrt(rr + zz + 2 * area), sqrt(along**2 + turned**2)
     shear = rz / trace
@@ -205,8 +213,10 @@ def _left_stretch(rr: Any, rz: Any, zz: Any, along: Any, turned: Any,
 
 def _positive_definite(b: np.ndarray, mean: np.ndarray) -> np.ndarray:
     """Return fields b, shape (cells, 6, 6), that are positive definite everywhere in their cells.
+
     Where a rapid rotation makes them indefinite, they move towards their means, shape (cells, 6), as far as needed.
-    Entries: rr, rz, zz, hoop, cosine, sine."""
+    Entries: rr, rz, zz, hoop, cosine, sine.
+    """
     mean = mean[:, None]
     deviation, shapes = b - mean, _tabulated(_QUADRATIC, _LATTICE)[0]
     for k in range(12):

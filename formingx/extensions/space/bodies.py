@@ -15,9 +15,11 @@ from ...mesh.edges import edges_of
 
 
 def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> list[np.ndarray]:
-    """Return groups of bodies of a closed surface with disjoint bounding boxes: row numbers of its triangles, shape
-    (k,) each. points: shape (n, 3), length; triangles: shape (m, 3). A cavity belongs to the body around it. Raise
-    `InputError` if triangles look inward and are no cavity."""
+    """Return the bodies of a closed surface, in groups: row numbers of their triangles, shape (k,) each.
+
+    Groups have disjoint bounding boxes; a cavity belongs to the body around it. points: shape (n, 3), length;
+    triangles: shape (m, 3). Triangles that look inward and are no cavity are an InputError.
+    """
     parts = _parts(points, triangles)
     bodies = [triangles[part] for part in parts]
     boxes = np.array([[points[body].min((0, 1)), points[body].max((0, 1))] for body in bodies])
@@ -44,7 +46,9 @@ def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> l
 
 def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Merge coincident vertices, shape (n, 3), length, to 1e-7 of the extent, and drop degenerate triangles.
-    Return the vertices, shape (k, 3), and the remaining triangles, shape (l, 3)."""
+
+    Return the vertices, shape (k, 3), and the remaining triangles, shape (l, 3).
+    """
     size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
     _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
     triangles = same.ravel()[triangles]
@@ -54,8 +58,10 @@ def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.nd
 
 def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
     """Return for each body the indices of its k triangles in `triangles`, shape (k,).
+
     A body is a set of triangles, shape (m, 3), connected by edges. At an edge of more than two triangles, only the two
-    with the solid between them are connected."""
+    with the solid between them are connected.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     n, (directed, edges, edge, times) = len(triangles), edges_of(triangles)
@@ -72,9 +78,11 @@ def _parts(points: np.ndarray, triangles: np.ndarray) -> list[np.ndarray]:
 
 def _wedges(points: np.ndarray, triangles: np.ndarray, directed: np.ndarray, edge: np.ndarray) -> list[np.ndarray]:
     """Return the pairs of triangles at a common edge with solid between them, as row numbers of `triangles`, (2,) each.
+
     Triangles, shape (m, 3), counter-clockwise from outside, are sorted by their angle about the edge. Solid lies after
     one with the edge as (edge[1], edge[0]), up to the next with the opposite order (`directed`, shape (m, 2)). At equal
-    angles the one that ends the solid comes first."""
+    angles the one that ends the solid comes first.
+    """
     forward = directed[:, 0] == edge[0]
     along = points[edge[1]] - points[edge[0]]
     along /= np.linalg.norm(along)

@@ -36,7 +36,9 @@ _LARGE_WALL_ERROR = 0.2
 @register("end")
 def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
     """Yield a finding if 0.1 % or more of the reference area of a membrane is in compression; collective.
-    This holds for the last state, without relaxed energy (tension-field theory)."""
+
+    This holds for the last state, without relaxed energy (tension-field theory).
+    """
     scene = path.problem.scene
     if scene.kinematics.components != 3 or scene.model.wrinkles is not None:
         return
@@ -84,7 +86,9 @@ def bridged_ridges(path: Any) -> Iterator[Finding]:
 @register("end")
 def unbalanced_loads(path: Any) -> Iterator[Finding]:
     """Yield a finding if supports and tools miss the resultant of the loads by 2 % or more; collective.
-    The internal forces of a sheet have no resultant, so the reactions balance the loads unless one of them is wrong."""
+
+    The internal forces of a sheet have no resultant, so the reactions balance the loads unless one of them is wrong.
+    """
     problem = path.problem
     if path.scene.kinematics.components != 3 or not problem.contacts or not problem.scene.loads:
         return
@@ -116,7 +120,9 @@ def unbalanced_loads(path: Any) -> Iterator[Finding]:
 @register("start")
 def coarse_triangles(body: Any) -> Iterator[Finding]:
     """Yield a finding for a triangle longer than half the distance from the edges held in z to the sheet's middle.
-    The pressure of a blister is then off by 4 to 12 %, or more (tests/test_checks_in_space.py)."""
+
+    The pressure of a blister is then off by 4 to 12 %, or more (tests/test_checks_in_space.py).
+    """
     scene = body.scene
     if scene.kinematics.components != 3:
         return
@@ -163,7 +169,9 @@ def asymmetric_across_planes(body: Any) -> Iterator[Finding]:
 @register("failure")
 def slack_sheet(failure: Any) -> Iterator[Finding]:
     """Yield a finding if a sheet that has relaxed on a tool is slack at the start of a pressure in no time; collective.
-    Only a very small stiffness then holds its positions, of which many are in equilibrium."""
+
+    Only a very small stiffness then holds its positions, of which many are in equilibrium.
+    """
     problem, facts, target = failure.problem, failure.facts, failure.target
     if failure.last is None or problem.scene.kinematics.components != 3 or not target:
         return
@@ -179,8 +187,10 @@ def slack_sheet(failure: Any) -> Iterator[Finding]:
 @register("failure")
 def slack_part(failure: Any) -> Iterator[Finding]:
     """Yield a finding if the largest out-of-balance force is at a slack part of a sheet; collective.
+
     With relaxed energy such a part carries no tension in one direction, and little in the other. Its tangent is nearly
-    singular."""
+    singular.
+    """
     problem, worst = failure.problem, failure.facts.get("worst")
     scene = problem.scene
     if failure.last is None or worst is None or scene.kinematics.components != 3 or scene.model.wrinkles is None:

@@ -54,8 +54,10 @@ class Borders(NamedTuple):
 
 def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
     """Return unit normals of a smooth surface at the corners of triangles, shape (m, 3, 3).
+
     crease: angle from which an edge is sharp, degrees; 0: flat triangles. It is reduced until no normal tilts from that
-    of its triangle by more than this angle, as beside an edge that is just below it."""
+    of its triangle by more than this angle, as beside an edge that is just below it.
+    """
     facet, limit = unit(area_vectors(points, triangles))[:, None], np.radians(crease)
     i, j = (side % len(triangles) for side in sides_of_edges(triangles))
     turn = turns(facet[:, 0], i, j)
@@ -74,7 +76,9 @@ def corner_normals(points: np.ndarray, triangles: np.ndarray, crease: float) -> 
 
 def misfit(points: np.ndarray, triangles: np.ndarray, normals: np.ndarray) -> tuple[float, np.ndarray]:
     """Return the misfit of normals, shape (m, 3, 3), to smooth edges over the turns there, and its worst place.
-    Both are root mean squares, weighted with the areas of the triangles. The place has the shape (3,), length."""
+
+    Both are root mean squares, weighted with the areas of the triangles. The place has the shape (3,), length.
+    """
     m, area = len(triangles), area_vectors(points, triangles)
     i, j = sides_of_edges(triangles)
     s, k, t, l = i % m, i // m, j % m, j // m
@@ -98,8 +102,10 @@ def turns(facet: np.ndarray, i: np.ndarray, j: np.ndarray) -> np.ndarray:
 
 def corner_groups(points: np.ndarray, triangles: np.ndarray, crease: float) -> np.ndarray:
     """Return the number of the group of each corner of each triangle, shape (m, 3).
+
     crease: radians. The corners of a group are at one vertex and have one normal: edges that are not sharp connect
-    their triangles. At a tip, such as that of a cone, each corner is a group."""
+    their triangles. At a tip, such as that of a cone, each corner is a group.
+    """
     m, facet = len(triangles), unit(area_vectors(points, triangles))
     i, j = sides_of_edges(triangles)
     smooth = turns(facet, i % m, j % m) < crease
@@ -111,7 +117,9 @@ def corner_groups(points: np.ndarray, triangles: np.ndarray, crease: float) -> n
 
 def _connected(m: int, i: np.ndarray, j: np.ndarray, tips: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Return the groups of corners that smooth edges connect, shape (m, 3).
-    i, j: the two sides of each smooth edge, shape (k,). tips: mask of vertices without connection, shape (n,)."""
+
+    i, j: the two sides of each smooth edge, shape (k,). tips: mask of vertices without connection, shape (n,).
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     s, k, t, l = i % m, i // m, j % m, j // m
@@ -125,9 +133,11 @@ def _connected(m: int, i: np.ndarray, j: np.ndarray, tips: np.ndarray, triangles
 def _tips(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, facet: np.ndarray, i: np.ndarray,
           j: np.ndarray) -> np.ndarray:
     """Return the mask of the vertices that are tips, shape (n,).
+
     groups: shape (m, 3). i, j: sides of smooth edges, shape (k,). At a tip normals differ from their mean in all
     directions, and the triangles turn against the next by less than half that angle; at the pole of a sphere by that
-    angle or more."""
+    angle or more.
+    """
     m, n = len(triangles), int(groups.max()) + 1
     turn = np.zeros(3 * m)                                    # at side k m + t, 0 at a crease
     turn[i] = turn[j] = turns(facet, i % m, j % m)
@@ -163,11 +173,13 @@ def mean_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray) 
 def flat_directions(points: np.ndarray, triangles: np.ndarray, crease: float
                     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the plane of each triangle, or -1, shape (m,), and the k edges across which a region is straight.
+
     For each edge: triangle, number (0, 1, 2), direction across it in the plane, (k, 3). A region is connected and
     coplanar. A facet of a curved surface turns as much against one neighbour as against the next. A plane beside a
     fillet turns half as much against its first facet as this one against the second; so does a cylinder along its
     rulings, where a torus follows: a region of two triangles or more is straight where this ratio is near 1/2. crease:
-    radians."""
+    radians.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     m, area = len(triangles), area_vectors(points, triangles)
@@ -199,8 +211,10 @@ def flat_directions(points: np.ndarray, triangles: np.ndarray, crease: float
 def _borders(points: np.ndarray, triangles: np.ndarray, facet: np.ndarray, region: np.ndarray, turn: np.ndarray,
              sides: tuple[np.ndarray, np.ndarray], kept: np.ndarray) -> Borders:
     """Return some edges between regions, from both sides.
+
     region: of each triangle, shape (m,). turn: angles at k edges, shape (k,), radians. sides: both sides, shape (k,)
-    each. kept: mask, shape (k,)."""
+    each. kept: mask, shape (k,).
+    """
     m, (i, j) = len(triangles), sides
     side, opposite = np.concatenate([i[kept], j[kept]]), np.concatenate([j[kept], i[kept]])
     k, own = side // m, side % m
@@ -221,8 +235,10 @@ def _turn_ahead(borders: Borders, rows: np.ndarray) -> np.ndarray:
 
 def _bends_behind(borders: Borders, ends: Borders, rows: np.ndarray) -> np.ndarray:
     """Return the mask of sharp edges from which their region leads to a curved surface at its far side, shape (k,).
+
     A region between two sharp edges, such as a facet of a cone, has no curvature from one to the other. `borders` are
-    smooth."""
+    smooth.
+    """
     found = np.zeros(len(rows), dtype=bool)
     for near, far in _pairs(ends.region[rows], borders.region):
         behind = (borders.turn[far] > 0) & (
@@ -248,8 +264,10 @@ def _pairs(wanted: np.ndarray, regions: np.ndarray) -> Iterator[tuple[np.ndarray
 
 def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray, crease: float) -> np.ndarray:
     """Return the normals of the groups of corners, fitted to edges of constant curvature, shape (groups, 3).
+
     These equations leave modes of alternating tilt and bulging planes. So normals of planes are given, normals have no
-    part along straight directions (`flat_directions`), and pairs across an edge have equations of small weight."""
+    part along straight directions (`flat_directions`), and pairs across an edge have equations of small weight.
+    """
     from scipy.sparse import coo_array, diags_array
     area, n = area_vectors(points, triangles), int(groups.max()) + 1
     facet, N = unit(area), mean_normals(points, triangles, groups)
@@ -300,7 +318,9 @@ def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
 
 def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
     """Return a function that solves for a right-hand side, shape (n,), with the MUMPS factors of a matrix.
-    It is symmetric positive definite, of scipy in compressed rows."""
+
+    It is symmetric positive definite, of scipy in compressed rows.
+    """
     from petsc4py import PETSc
     first, columns = (part.astype(PETSc.IntType) for part in (matrix.indptr, matrix.indices))
     A = PETSc.Mat().createAIJ(matrix.shape, csr=(first, columns, matrix.data), comm=PETSc.COMM_SELF)
@@ -323,7 +343,9 @@ def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
 def _equations(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the pairs of groups whose normals satisfy N_a.e + N_b.e = 0, shape (k, 2).
-    Also the weights of the equations, shape (k,), and the unit vectors e, shape (k, 3)."""
+
+    Also the weights of the equations, shape (k,), and the unit vectors e, shape (k, 3).
+    """
     x = np.zeros((int(groups.max()) + 1, 3))
     x[groups.ravel()] = points[triangles.ravel()]
     apex = np.concatenate([groups[:, (i + 2) % 3] for i in range(3)])

@@ -71,9 +71,11 @@ class SelfPenetration:
 def crossings(points: np.ndarray, triangles: np.ndarray, least: float, wall: float = 0.0,
               reference: np.ndarray | None = None, crease: float = 0.0) -> np.ndarray:
     """Return the places where edges of a surface pass through its triangles, and their depths, (k, 4), length.
+
     The depth is the smaller distance of an edge's ends from the plane. Edges count that are deeper than `least`, and
     than `wall` or 0.4 of the triangle's longest edge. Of two triangles nearer than `crease` in the reference
-    configuration, shape (n, 3), `wall` alone counts."""
+    configuration, shape (n, 3), `wall` alone counts.
+    """
     X = points if reference is None else reference
     room = 100
     while True:

@@ -206,8 +206,10 @@ def _both(name: str, elements: Any) -> list[Any]:
 
 def _grid(line: np.ndarray, angles: np.ndarray, part: str) -> Grid:
     """Return a surface of revolution from a meridian (r, z), neck first, shape (n, 2), length.
+
     Triangles are counter-clockwise from outside, in columns between the angles round the part "whole", "half" or
-    "quarter", shape (columns + 1,), radians. Each ring of chords encloses the area of its circle."""
+    "quarter", shape (columns + 1,), radians. Each ring of chords encloses the area of its circle.
+    """
     columns, closed, whole = len(angles) - 1, line[-1, 0] == 0, part == "whole"
     rings, n = line[:-1] if closed else line, columns if whole else columns + 1
     if whole and columns < 3:

@@ -14,7 +14,9 @@ from .lagged_friction import Distances
 
 def rounded_minimum(a: np.ndarray, b: np.ndarray, fillet: float) -> np.ndarray:
     """Return the signed distances from the common part of two solids with a fillet at their edge, shape (n,), length.
-    a, b: signed distances from both solids, shape (n,), length."""
+
+    a, b: signed distances from both solids, shape (n,), length.
+    """
     R = fillet
     return np.maximum(R, np.minimum(a, b)) - np.hypot(np.maximum(R - a, 0.0), np.maximum(R - b, 0.0)) if R else (
         np.minimum(a, b))
@@ -22,7 +24,9 @@ def rounded_minimum(a: np.ndarray, b: np.ndarray, fillet: float) -> np.ndarray:
 
 def rounded_distances(a: Distances, b: Distances, fillet: float) -> Distances:
     """Return the distances of n points from the common part of two solids, with first and second derivatives.
-    a, b: distances from both solids. fillet: radius of the edge, length."""
+
+    a, b: distances from both solids. fillet: radius of the edge, length.
+    """
     u, v = (np.maximum(fillet - part.distance, 0.0) for part in (a, b))
     nearer = (a.distance <= b.distance)[:, None]
     s = np.hypot(u, v)

@@ -18,7 +18,9 @@ _CUT_PIECES = 40           # extent of a surface over the longest edge of triang
 
 class HalfSpace(SolidTool):
     """Rigid half space normal to the coordinate axis 0, 1 or 2; `position` is its plane, length.
-    The solid lies on the side of larger values if `sign` is 1, of smaller ones if -1."""
+
+    The solid lies on the side of larger values if `sign` is 1, of smaller ones if -1.
+    """
 
     sized = False
 
@@ -99,8 +101,10 @@ class Intersection(SolidTool):
 
 def _inside(corners: np.ndarray, tool: SolidTool, size: float) -> np.ndarray:
     """Return the triangles of a surface that lie in the solid of a tool, cut at its surface, shape (k, 3, 3), length.
+
     corners: shape (m, 3, 3), length; size: extent of the surface, length. Triangles that the surface of the tool may
-    cross are halved until they are short."""
+    cross are halved until they are short.
+    """
     found, near = [], 1e-9 * size
     while len(corners):
         d = tool.signed_distance(corners.reshape(-1, 3)).reshape(-1, 3)

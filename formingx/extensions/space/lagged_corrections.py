@@ -19,7 +19,9 @@ log = logging.getLogger("formingx")
 
 class LaggedCorrections:
     """Corrections of a solved step, for all faces with lagged contact.
-    n: number of locally owned unknowns of the fields."""
+
+    n: number of locally owned unknowns of the fields.
+    """
 
     def __init__(self, contacts: list[LaggedApproach], n: int):
         self._contacts, self._n = contacts, n
@@ -30,8 +32,10 @@ class LaggedCorrections:
 
     def separate(self, curve: Curve, old: State, new: State, jump: Callable[[State], State]) -> State:
         """Separate the points in tension from their tools, and solve for `new` again at the same control.
+
         `jump` returns the state after a snap-through if the body snaps off its tool. Raise `Failure` without a
-        state."""
+        state.
+        """
         for _ in range(LAGGED.max_solutions):
             if not self._separates(new):
                 return new
@@ -43,9 +47,11 @@ class LaggedCorrections:
 
     def close_penetrated(self, curve: Curve, old: State, new: State, equation: Constraint | None) -> State:
         """Put points that penetrate a tool into contact where they met it, and solve again for the end of a step.
+
         At a target (`equation`) all tools count and pressures are renewed: without friction the state is then
         independent of earlier steps; if this fails, the solution before is returned. Elsewhere tools with friction
-        count, and the control stays. Raise `Failure` without a state."""
+        count, and the control stays. Raise `Failure` without a state.
+        """
         constraint = equation or fixed(new.control)
         for sweep in range(LAGGED.max_solutions):
             late = any([c.correct(new.x[:self._n], new.control, equation is not None, sweep) for c in self._contacts])

@@ -50,6 +50,7 @@ class Distances(NamedTuple):
 
 class LaggedFriction(LaggedStick):
     """Contact law of points that slide on a tool in three dimensions, with lagged friction or without friction.
+
     Friction is lagged: its limit mu N_0 is constant during a step. N_0 is the pressure at the last accepted state,
     extrapolated along the path. The history variables (`ContactHistory`) of the n points at this state are:
 
@@ -60,7 +61,8 @@ class LaggedFriction(LaggedStick):
     * `closure`: positions that store N_0: their depth in the tool is N_0/k, shape (n, 3), length.
 
     The tool has a method `distances`. mu has shape () or (n,), 0 without friction; k is in stress/length. A point is in
-    contact where its signed distance exceeds -theta, and begins to slide at `elastic_slip`, length."""
+    contact where its signed distance exceeds -theta, and begins to slide at `elastic_slip`, length.
+    """
 
     tool: Any
     mu: Any
@@ -98,8 +100,10 @@ class LaggedFriction(LaggedStick):
 
     def friction_pressure(self, old: ContactHistory) -> np.ndarray:
         """Return the contact pressure N_0 that limits friction during the next step, shape (n,), stress.
+
         It is the penalty times the depth of `ContactHistory.closure`, at most 10 times larger or smaller than the
-        pressure at the last accepted state."""
+        pressure at the last accepted state.
+        """
         if self._pressure_ahead is None or self._pressure_ahead[0] is not old:
             now, change = np.maximum(old.distance, 0.0), old.closure - old.position
             depth = now
@@ -110,16 +114,20 @@ class LaggedFriction(LaggedStick):
 
     def closure_at_pressure(self, old: ContactHistory, pressure: np.ndarray) -> np.ndarray:
         """Return the positions, shape (n, 3), length, whose depth in the tool is a pressure over the penalty.
-        `friction_pressure` then limits friction by it; pressure: shape (n,), stress."""
+
+        `friction_pressure` then limits friction by it; pressure: shape (n,), stress.
+        """
         change = pressure / self.k - np.maximum(old.distance, 0.0)
         return np.asarray(old.position + change[:, None] * self.tool.distances(old.position).normal)
 
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
-        """Compute the tractions at positions x, shape (n, 3), length, linearised at `expected` positions and distances
-        (None: x). sense: direction of sliding in the previous iteration, shape (n,), radians from the first to the
-        second vector of `_basis`; 0: none. A point whose slip reverses sticks for one iteration: Newton's method would
-        oscillate over the narrow range of elastic slip."""
+        """Compute the tractions at positions x, shape (n, 3), length, linearised at `expected` positions and distances.
+
+        sense: direction of sliding in the previous iteration, shape (n,), radians from the first to the second vector
+        of `_basis`; 0: none. A point whose slip reverses sticks for one iteration: Newton's method would oscillate over
+        the narrow range of elastic slip.
+        """
         assert old is not None
         positions, zero = x if expected is None else expected.position, np.zeros(len(x))
         rows, distances = self.contact_distances(positions, old)
@@ -172,7 +180,9 @@ class LaggedFriction(LaggedStick):
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
         """Return distances and normals at x, shape (n, 3), length, for a first-order prediction of distances.
-        They are 0 for open points. All slips are 0."""
+
+        They are 0 for open points. All slips are 0.
+        """
         assert old is not None
         d, n = np.zeros(len(x)), np.zeros_like(x)
         rows, distances = self.contact_distances(x, old)
@@ -181,7 +191,9 @@ class LaggedFriction(LaggedStick):
 
     def _distances(self, x: np.ndarray) -> Distances:
         """Return distances, normals and Hessians at positions x, shape (n, 3), length.
-        The last four results are stored, and returned again for the same positions."""
+
+        The last four results are stored, and returned again for the same positions.
+        """
         for positions, found in self._last:
             if np.array_equal(positions, x):
                 return found
@@ -192,7 +204,9 @@ class LaggedFriction(LaggedStick):
 
 class _Tractions(Tractions):
     """Contact tractions whose `sense` is the direction of sliding as an angle in the tangent plane, radians.
-    It is measured from the first vector of `_basis` towards the second, and is 0 for a point that does not slide."""
+
+    It is measured from the first vector of `_basis` towards the second, and is 0 for a point that does not slide.
+    """
 
     @property
     def status(self) -> np.ndarray:
@@ -202,7 +216,9 @@ class _Tractions(Tractions):
 
 def _basis(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return two orthogonal unit vectors in each tangent plane, shape (n, 3) each; normal: unit normals, shape (n, 3).
-    Source: Duff et al., Journal of Computer Graphics Techniques 6 (2017) 1."""
+
+    Source: Duff et al., Journal of Computer Graphics Techniques 6 (2017) 1.
+    """
     x, y, z = normal.T
     side = np.where(z < 0, -1.0, 1.0)
     a = -1 / (side + z)

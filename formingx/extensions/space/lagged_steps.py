@@ -68,7 +68,9 @@ _SHORTENINGS = 50          # of a step until its predicted change of pressure is
 
 class LaggedApproach(Approach):
     """Lagged contact of one face during a step, see `formingx.contact.step_limit.Approach`.
-    conducts: True if heat flows through points in contact, from the end of the step on."""
+
+    conducts: True if heat flows through points in contact, from the end of the step on.
+    """
 
     def __init__(self, face: FaceContact, conducts: bool):
         super().__init__(face, conducts)
@@ -91,7 +93,9 @@ class LaggedApproach(Approach):
 
     def has_too_many_closures(self, a: np.ndarray, b: np.ndarray) -> bool:
         """Return True if a new point is deeper in the tool than twice its tributary length.
-        a, b: positions before and after the step, shape (n, 3), length."""
+
+        a, b: positions before and after the step, shape (n, 3), length.
+        """
         law, history = self.face.law, self.face.history
         deep = np.where(law.touching(a, history), 0.0, law.distance(b) - 2 * self.face.rule.lengths)
         return bool(combined(self._comm, float(deep.max(initial=0.0)), MPI.MAX) > 0)
@@ -101,8 +105,10 @@ class LaggedApproach(Approach):
 
     def _jumps_over(self, old: np.ndarray, old_control: float, new: np.ndarray, control: float) -> bool:
         """Return True if an open point that does not stick enters the tool in a step, up to its other side.
+
         A point that sticks is held where it entered. Another one would be pushed out where it is nearest to the
-        surface, which must be the side on which it entered. old, new: owned unknowns, shape (n,)."""
+        surface, which must be the side on which it entered. old, new: owned unknowns, shape (n,).
+        """
         face, law = self.face, self.face.law
         if face.contact.sticks or face.history is None:
             return False
@@ -122,7 +128,9 @@ class LaggedApproach(Approach):
 
     def passed(self, fields: np.ndarray, control: float) -> PassedPoint | None:
         """Return the point of the tool that passed the sheet farthest; None if less than is resolved.
-        fields: owned unknowns, shape (n,)."""
+
+        fields: owned unknowns, shape (n,).
+        """
         if self._last is None or self._last[1] != control or not np.array_equal(self._last[0], fields):
             found = self._passed_tool.deepest(fields, control, LAGGED.max_passed_ratio, self._bridged_limit)
             self._last = fields.copy(), control, found
@@ -161,7 +169,9 @@ class LaggedApproach(Approach):
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
         """Open the points in tension; return True if there are any.
-        Collective. fields, control: locally owned unknowns, shape (n,), and load parameter of the converged state."""
+
+        Collective. fields, control: locally owned unknowns, shape (n,), and load parameter of the converged state.
+        """
         face, variables = self.face, self.face.get()
         if variables is None or not face.contact.separates:
             return False
@@ -176,13 +186,17 @@ class LaggedApproach(Approach):
 
     def correct(self, fields: np.ndarray, control: float, at_target: bool, sweep: int) -> bool:
         """Close points that penetrated the tool in a step, and renew friction's pressure; True: solve again.
-        Gaps close at a target or with lagged friction. sweep: number of earlier calls for this step."""
+
+        Gaps close at a target or with lagged friction. sweep: number of earlier calls for this step.
+        """
         late = (at_target or self.has_lagged_friction) and self._close_penetrated(fields, control)
         return (sweep < LAGGED.max_corrections and self.update_pressure(fields, control)) | late
 
     def _close_penetrated(self, fields: np.ndarray, control: float) -> bool:
         """Close the gaps of open points that penetrate the tool more than is negligible; True if any; collective.
-        Each such point sticks or slides from the position where its path in the step met the tool."""
+
+        Each such point sticks or slides from the position where its path in the step met the tool.
+        """
         face, variables = self.face, self.face.get()
         if variables is None:
             return False
@@ -210,7 +224,9 @@ class LaggedApproach(Approach):
 
     def update_pressure(self, new: np.ndarray, control: float) -> bool:
         """Replace the pressure that bounds lagged friction by that at the end of the step; new: shape (n,).
-        False if both agree to `LaggedLimits.max_pressure_difference`, or friction is not lagged."""
+
+        False if both agree to `LaggedLimits.max_pressure_difference`, or friction is not lagged.
+        """
         if not self.has_lagged_friction:
             return False
         face, law = self.face, self.face.law
@@ -222,9 +238,11 @@ class LaggedApproach(Approach):
 
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:
         """Replace the stored contact pressure by that of a state at a target, owned unknowns, shape (n,).
+
         It bounds friction in a step, and turns a fluid pressure into the normals of a tool on which the sheet slides.
         False if both agree to `LaggedLimits.max_target_difference` in the area-weighted 1-norm, or if none is
-        stored."""
+        stored.
+        """
         face, law, variables = self.face, self.face.law, self.face.get()
         if variables is None or face.contact.sticks:
             return False
@@ -240,8 +258,10 @@ class LaggedApproach(Approach):
 
     def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
         """Return the arc length, at most `length`, in which the pressure changes by `LaggedLimits.max_pressure_change`.
+
         start, velocity: positions relative to the tool and d/ds, shape (n, c), length. The pressure is extrapolated
-        linearly, down to 0, so its change grows less than in proportion. Without lagged friction: `length`."""
+        linearly, down to 0, so its change grows less than in proportion. Without lagged friction: `length`.
+        """
         if not self.has_lagged_friction:
             return length
         law, history = self.face.law, self.face.history
@@ -255,8 +275,10 @@ class LaggedApproach(Approach):
 
     def _pressure_difference(self, normal: np.ndarray, other: np.ndarray | None = None) -> float:
         """Return the relative difference of two pressures, shape (n,), stress, in the area-weighted 1-norm.
+
         other: None for that of the last accepted state, whose points under pressure count. The sum is divided by their
-        force plus a small one (`LaggedLimits.min_force`)."""
+        force plus a small one (`LaggedLimits.min_force`).
+        """
         face, before = self.face, self.face.law.pressure(self.face.history)
         difference = np.abs(np.maximum(normal, 0.0) - (before if other is None else other))
         sums = np.array([face.rule.area @ np.where(before > 0, difference, 0.0), face.rule.area @ before])

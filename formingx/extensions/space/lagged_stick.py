@@ -37,11 +37,13 @@ _BISECTIONS = math.ceil(-math.log2(ROUND_OFF))
 
 
 class LaggedStick(ContactLaw):
-    """Contact law of points that stick where they crossed a tool in three dimensions, with the penalty k,
-    stress/length. The points in contact are lagged: those of the last accepted state during a whole step. A point
-    sticks where its signed distance, positive inside, exceeds -theta, length. `ContactHistory` has the sticking
-    position and the distance 0 of a sticking point, of an open one its position and signed distance at the last
-    accepted state. separates: True if points in tension separate at the end of a step."""
+    """Contact law, with penalty k, stress/length, of points that stick where they crossed a tool in three dimensions.
+
+    The points in contact are lagged: those of the last accepted state during a whole step. A point sticks where its
+    signed distance, positive inside, exceeds -theta, length. `ContactHistory` has the sticking position and the
+    distance 0 of a sticking point, of an open one its position and signed distance at the last accepted state.
+    separates: True if points in tension separate at the end of a step.
+    """
 
     has_history = adhesive = sticks = True
     mu = np.inf
@@ -60,8 +62,10 @@ class LaggedStick(ContactLaw):
 
     def in_tension(self, x: np.ndarray, old: ContactHistory) -> np.ndarray:
         """Return the mask of sticking points in tension, shape (n,), which separate at the end of a step.
+
         They lie outside by over 0.01 times the way from their sticking position and 0.001 theta. None if `separates` is
-        False."""
+        False.
+        """
         travel = np.linalg.norm(x - old.position, axis=1)
         limit = np.maximum(_TENSILE_DISTANCE * travel, NEGLIGIBLE * self.theta)
         return self.separates & self.in_contact(old) & (-self.distance(x) > limit)
@@ -71,7 +75,9 @@ class LaggedStick(ContactLaw):
 
     def distance(self, x: np.ndarray) -> np.ndarray:
         """Return the signed distances of points, shape (n, 3) or (m, n, 3), length, positive inside.
-        The last three results are stored, and returned again for the same positions."""
+
+        The last three results are stored, and returned again for the same positions.
+        """
         for positions, found in self._found:
             if np.array_equal(positions, x):
                 return found
@@ -82,8 +88,10 @@ class LaggedStick(ContactLaw):
 
     def entries(self, a: np.ndarray, b: np.ndarray, free: np.ndarray, ends: np.ndarray) -> np.ndarray:
         """Return where straight paths enter the tool, as shares of the paths, shape (n,); inf for paths outside it.
+
         a, b: start (outside the tool) and end, shape (n, 3), length. free: mask of the paths that are examined, the
-        others have inf. ends: mask of paths that end in the tool or on it, shape (n,)."""
+        others have inf. ends: mask of paths that end in the tool or on it, shape (n,).
+        """
         hit, low, high = self._bracketed_entries(a, b, free, ends)
         found: np.ndarray = np.where(free & ends, 1.0, np.inf)
         way = (b - a)[hit]
@@ -106,7 +114,9 @@ class LaggedStick(ContactLaw):
     def _bracketed_entries(self, a: np.ndarray, b: np.ndarray, free: np.ndarray,
                            ends: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the numbers of paths that enter the tool, and shares of them before and after, shape (m,) each.
-        The distance from the tool is a safe advance along a path, so no thin part is passed over."""
+
+        The distance from the tool is a safe advance along a path, so no thin part is passed over.
+        """
         length = np.linalg.norm(b - a, axis=1)
         rows = np.flatnonzero(free & (ends | (length > -self.distance(a) - self.distance(b))) & (length > 0))
         start, way, length = a[rows], (b - a)[rows], length[rows]
@@ -136,8 +146,10 @@ class LaggedStick(ContactLaw):
     def tractions(self, x: np.ndarray, old: ContactHistory | None, sense: np.ndarray | None = None,
                   expected: Motion | None = None) -> Tractions:
         """Compute the tractions k (x - x_0) of sticking points with the penalty k; 0 for open points.
+
         x: shape (n, 3), length. x_0 is where the point crossed the tool. The law computes no normals:
-        `Tractions.normal` is 1 for a sticking point and 0 for an open one, not a stress."""
+        `Tractions.normal` is 1 for a sticking point and 0 for an open one, not a stress.
+        """
         assert old is not None
         sticking, zero, force = self.in_contact(old), np.zeros(len(x)), np.zeros_like(x)
         force[sticking] = self.k * (x[sticking] - old.position[sticking])
@@ -151,8 +163,10 @@ class LaggedStick(ContactLaw):
 
     def _history(self, x: np.ndarray, old: ContactHistory, sticking: np.ndarray) -> ContactHistory:
         """Return the history variables after the state at x, shape (n, 3), length, is accepted.
+
         A point whose gap closed in the step sticks where its straight path enters the tool. sticking: mask of the
-        points that stick already, shape (n,)."""
+        points that stick already, shape (n,).
+        """
         d = self.distance(x)
         share = self.entries(old.position, x, ~sticking, d > -self.theta)
         new = np.isfinite(share)

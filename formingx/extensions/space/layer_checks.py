@@ -11,8 +11,10 @@ from ...findings import Finding, coordinates, register
 @register("start")
 def tools_that_reach_the_opposite_layer(body: Any) -> Iterator[Finding]:
     """Yield a finding for each tool whose travel ends beyond the opposite layer of a tube by more than the wall.
+
     The travel is along the normal of this layer, in the reference configuration: the layer in front of the tool is
-    pushed into it. A plane of symmetry or a parting plane between them ends the travel before."""
+    pushed into it. A plane of symmetry or a parting plane between them ends the travel before.
+    """
     scene = body.scene
     if scene.kinematics.components != 3 or scene.mesh.flat:
         return

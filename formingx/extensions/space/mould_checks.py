@@ -21,8 +21,10 @@ _INSIDE = 0.01             # distance of a held edge inside the mouth of a mould
 @register("start")
 def sizes(body: Any) -> Iterator[Finding]:
     """Yield a finding for each fixed tool over 4 times wider or narrower than the sheet, as in another unit.
+
     A wide STL file is always reported, a wide swept profile, whose flange is arbitrary, if it is farther from the sheet
-    than this is wide. A narrow tool is reported if it is a cavity."""
+    than this is wide. A narrow tool is reported if it is a cavity.
+    """
     for contact in fixed_tools(body.scene):
         tool, sheet = contact.tool, whole_extent(body.scene)
         file = isinstance(tool, Triangulated)
@@ -70,8 +72,10 @@ def narrow_sheets(body: Any) -> Iterator[Finding]:
 @register("start")
 def narrow_moulds(body: Any) -> Iterator[Finding]:
     """Yield a finding for a face of the sheet with moulds past whose end it hangs, if a pressure is too large for it.
+
     The overhang bears about as much as a disc. Its radius is the largest distance of a node without a tool straight
-    ahead from nodes with one, and from the edges that are held."""
+    ahead from nodes with one, and from the edges that are held.
+    """
     scene = body.scene
     pressures = body.pressures() if scene.kinematics.components == 3 else []
     if not pressures or any(material.varies for material in scene.materials.values()):

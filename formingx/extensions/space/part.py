@@ -76,9 +76,11 @@ class SheetPart(PartNumbers):
 def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units: Units,
          planes: MirrorPlanes) -> SheetPart:
     """Return the numbers of the whole formed part, from the wall of the sheet in a state and its mirror planes.
+
     trim: z of a plane, length, whose side away from the flat sheet (upper side of another surface) is the part, or an
     outline around it. heights must be empty (`SheetWall.section` gives cuts). density: g/cm3. Raise `InputError` for
-    heights, a trim that does not meet the part, or a density that is not positive."""
+    heights, a trim that does not meet the part, or a density that is not positive.
+    """
     if len(tuple(heights)):
         raise InputError("part: heights: in three dimensions use path.wall().section(point, normal)")
     share = np.ones(len(wall.wall)) if trim is None else _trimmed_share(wall, trim)
@@ -106,7 +108,9 @@ def _capacity(wall: SheetWall, trim: Any) -> float | None:
 
 def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
     """Return the share of the area of each triangle that remains after trimming, shape (m,).
-    trim: z of a plane, length, or an outline (x, y). Raise `InputError` if it does not meet the part."""
+
+    trim: z of a plane, length, or an outline (x, y). Raise `InputError` if it does not meet the part.
+    """
     points = wall.deformed_points
     if not isinstance(trim, list | tuple | np.ndarray):
         level, z = finite("part: trim", trim), points[:, 2]
@@ -126,7 +130,9 @@ def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
 
 def _depth_in_polygon(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
     """Return the distances of points, shape (n, 2), from a polygon, positive inside, shape (n,), length.
-    corners: shape (k, 2), length."""
+
+    corners: shape (k, 2), length.
+    """
     inside, nearest = np.zeros(len(points), dtype=bool), np.full(len(points), np.inf)
     for a, b in zip(corners, np.roll(corners, -1, axis=0)):
         off, way = points - a, b - a
@@ -170,8 +176,10 @@ class SheetFilling(ColumnTable):
     @property
     def columns(self) -> dict[str, np.ndarray]:
         """Columns of the table, with a row for each state: {name: values, shape (n,)}.
+
         They are the first column of the run, such as "pressure", then "touching" and "gap", the attributes. Of a part
-        "rib" of a union there are "touching_rib", and the force on it along z, "rib_force"."""
+        "rib" of a union there are "touching_rib", and the force on it along z, "rib_force".
+        """
         found = {self.control[0]: self.control[1], "touching": self.touching, "gap": self.gap}
         for name, (touching, force) in self.parts.items():
             found |= {f"touching_{name}": touching, f"{name}_force": force[:, 2]}
@@ -180,7 +188,9 @@ class SheetFilling(ColumnTable):
 
 def filling(path: Any, contact: Any, states: Any = None) -> SheetFilling:
     """Return the filling of a tool by the sheet in some states of a run, all by default; collective.
-    In each state: the share of the sheet's area that touches the tool, and the largest distance from it."""
+
+    In each state: the share of the sheet's area that touches the tool, and the largest distance from it.
+    """
     rows, comm, states = [], path.problem.comm, path.states if states is None else states
     tool = contact.contact.tool
     names = tool.names if isinstance(tool, Union) else []

@@ -71,8 +71,10 @@ class PassedTool:
 
     def deepest(self, fields: np.ndarray, control: float, limit: float, bridged_limit: float) -> PassedPoint | None:
         """Return the point of the tool with the largest ratio above `limit`, or None; collective.
+
         fields: owned, shape (n,). Points whose ratio `bridged` (computed above `limit`, else infinite) is below its
-        limit come last; with 0 none is. Points nearer to a node than `limit` times the median edge are not examined."""
+        limit come last; with 0 none is. Points nearer to a node than `limit` times the median edge are not examined.
+        """
         face, x, sides = self._face, self._points, self._sides
         shift = face.tool_displacement(control)
         P = self._whole.positions(fields) - shift
@@ -99,8 +101,10 @@ class PassedTool:
 
     def _travels(self, x: np.ndarray, corners: np.ndarray, most: np.ndarray) -> np.ndarray:
         """Return how far triangles move along their normals until all corners are on the tool, shape (n,), length.
+
         It is infinite above `most`, shape (n,). x: points of the tool, shape (n, 3); corners: shape (n, 3, 3),
-        length."""
+        length.
+        """
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.linalg.norm(normal, axis=1)[:, None]
         normal *= np.sign(np.einsum("ni,ni->n", normal, x - corners.mean(1)))[:, None]          # out of the tool
@@ -125,8 +129,10 @@ def far_off(x: np.ndarray, points: np.ndarray, distance: float) -> np.ndarray:
 
 def surface_points(tool: Any, spacing: float, nodes: np.ndarray, margin: float) -> np.ndarray:
     """Return points on the surface of a tool over the sheet and a strip of width `margin`, shape (n, 3), length.
+
     Drawn triangles are divided to `spacing`, and the points moved onto the tool, without those inside another part.
-    nodes: of the flat sheet, shape (m, 3), length."""
+    nodes: of the flat sheet, shape (m, 3), length.
+    """
     low, high = nodes[:, :2].min(0) - margin, nodes[:, :2].max(0) + margin
     key = (spacing, *low, *high)
     if key not in _stored.setdefault(tool, {}):

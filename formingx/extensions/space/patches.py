@@ -42,7 +42,9 @@ def area_vectors(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
 
 def sides_of_edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return the two sides of each edge of exactly two triangles, shape (k,) each.
-    Side k m + t is the edge of triangle t (of m) from its corner k to the next."""
+
+    Side k m + t is the edge of triangle t (of m) from its corner k to the next.
+    """
     _, _, number, times = edges_of(triangles)
     order, starts = np.argsort(number, kind="stable"), np.concatenate([[0], np.cumsum(times)])
     two = np.flatnonzero(times == 2)
@@ -51,6 +53,7 @@ def sides_of_edges(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 class PatchSurface:
     """Closed surface of patches, with its nearest points.
+
     points: shape (n, 3), length; triangles: shape (m, 3), counter-clockwise seen from outside; normals: unit normals at
     their corners, shape (m, 3, 3), of a flat triangle its own.
 
@@ -92,14 +95,18 @@ class PatchSurface:
 
     def positions(self, triangles: np.ndarray, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return points of the surface and its unit normals, out of the tool, shape (n, 3) each.
-        coordinates: barycentric, for the first two corners, shape (n, 2)."""
+
+        coordinates: barycentric, for the first two corners, shape (n, 2).
+        """
         out = np.empty((len(triangles), 6, 3))
         _C.evaluate(len(triangles), triangles, self.patches, coordinates, out)
         return out[:, 0], unit(np.cross(out[:, 1], out[:, 2]))
 
     def _nearest(self, x: np.ndarray, derivatives: bool) -> tuple[Distances, np.ndarray]:
         """Return the distances of points, shape (n, 3), length, and the nearest triangles, shape (n,).
-        derivatives: False to leave normals and Hessians empty."""
+
+        derivatives: False to leave normals and Hessians empty.
+        """
         n = len(x)
         d, normal, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
         guess = self._guesses.pop(n, None)
@@ -135,7 +142,9 @@ class PatchSurface:
 
 def _neighbours(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """Return the normals of the neighbour across each edge at the two ends of the edge, shape (m, 3, 2, 3).
-    Without exactly two triangles at an edge, they are those of the triangle itself."""
+
+    Without exactly two triangles at an edge, they are those of the triangle itself.
+    """
     m = len(triangles)
     other = np.stack([np.stack([normals[:, k], normals[:, (k + 1) % 3]], 1) for k in range(3)], 1)
     i, j = sides_of_edges(triangles)
@@ -159,7 +168,9 @@ def _bulges(patches: np.ndarray, facet: np.ndarray) -> np.ndarray:
 
 def _end_tangent(chord: np.ndarray, normal: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the direction of the boundary curve at an end of each of m edges, shape (m, 3).
-    It lies in the tangent plane, along a crease in that of the neighbour too. chord: length."""
+
+    It lies in the tangent plane, along a crease in that of the neighbour too. chord: length.
+    """
     inside = unit(chord - (chord * normal).sum(1, keepdims=True) * normal)
     along = np.cross(normal, other)
     size = np.linalg.norm(along, axis=1, keepdims=True)
@@ -169,9 +180,11 @@ def _end_tangent(chord: np.ndarray, normal: np.ndarray, other: np.ndarray) -> np
 
 def control_points(corners: np.ndarray, normals: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return the control points of patches, shape (m, 18, 3), length; corners, normals: shape (m, 3, 3).
+
     Rows 4 k to 4 k + 3 lie on the boundary curve from corner k. Rows 12 + 2 k and 13 + 2 k are inner ones near corner
     k, for the edges from k to k + 1 and to k. other: normals of the neighbour across edge k at its two ends, shape (m,
-    3, 2, 3), equal to `normals` at smooth edges."""
+    3, 2, 3), equal to `normals` at smooth edges.
+    """
     m = len(corners)
     P, curve, leg = np.zeros((m, 18, 3)), np.zeros((m, 3, 5, 3)), np.zeros((m, 3, 3, 3))
     for k in range(3):

@@ -41,12 +41,14 @@ _BRIDGED = 0.25            # cosine of the angle between triangle and tool, belo
 
 class PressureOnTools:
     r"""Virtual work that turns the pressure on triangles that slide on tools into the normals of the tools.
+
     The forms contain the normal n of the tool to first order in the displacement u,
 
     .. math:: n(u, c) = n(u_0, c_0) + H (u - u_0 - (c - c_0) \, w)
 
     with the present displacement u_0 and control c_0, the Hessian H of the distance from the tool, and the motion w of
-    the tool by the control. The derivatives of the forms are therefore exact at (u_0, c_0)."""
+    the tool by the control. The derivatives of the forms are therefore exact at (u_0, c_0).
+    """
 
     def __init__(self, surface: Any):
         self._surface = surface
@@ -61,7 +63,9 @@ class PressureOnTools:
 
     def work(self, value: Any, area: Any, control: Any) -> Any:
         """Return the virtual work (UFL) that a pressure does in excess of p a n/3, to subtract from the residual.
-        value: pressure (UFL). area: deformed area vector per unit reference area (UFL, shape (3,)). control: UFL."""
+
+        value: pressure (UFL). area: deformed area vector per unit reference area (UFL, shape (3,)). control: UFL.
+        """
         surface, v = self._surface, self._surface.test_displacement()
         displacement, normal, motion, *hessian = (ufl.split(f)[0] for f in (
             self._displacement, self._normal, self._motion, *self._hessian))
@@ -80,8 +84,10 @@ class PressureOnTools:
 
     def refresh(self) -> None:
         """Update the coefficients of the virtual work to the present displacement of the sheet; collective.
+
         They are the normals of the tools at the nodes in contact, their derivatives, the motions of the tools by the
-        control, and the smallest contact pressure of each triangle's nodes, of the last accepted state."""
+        control, and the smallest contact pressure of each triangle's nodes, of the last accepted state.
+        """
         surface, n = self._surface, self._surface.space.dofmap.index_map.size_local
         fields, control = surface.w.x.array[:n], float(surface.control.value)
         state = [part for face in surface.faces for part in (
@@ -118,7 +124,9 @@ class PressureOnTools:
 
     def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the forces of the pressure on the tool of one face near its m points, shape (m, 3), stress length^2.
-        fields: owned unknowns, shape (n,). Collective."""
+
+        fields: owned unknowns, shape (n,). Collective.
+        """
         surface = self._surface
         w, before, earlier = surface.w.x, surface.w.x.array.copy(), float(surface.control.value)
         w.array[:len(fields)], surface.control.value = fields, control

@@ -36,8 +36,10 @@ _SAME_SHARE = 1e-9
 
 def thicknesses(scene: Any, given: Any) -> dict[str, Callable]:
     """Return {layer: reference thickness as a function of arrays (x, y, z)}, positive at all nodes; collective.
+
     given: a length, a function of arrays (x, y) or (x, y, z), or {layer: one of these}. Raise `InputError` if the mesh
-    is no `SurfaceMesh`, a layer has no thickness, or a thickness is not positive."""
+    is no `SurfaceMesh`, a layer has no thickness, or a thickness is not positive.
+    """
     mesh = scene.mesh
     if not isinstance(mesh, SurfaceMesh):
         raise InputError("Scene: mesh: a mesh in three dimensions must come from fx.mesh.sheet, tube, revolved, surface"
@@ -97,8 +99,10 @@ def _check(name: str, function: _OfPosition, X: np.ndarray) -> None:
 
 def refuse(scene: Any, heat: Any) -> None:
     """Raise an `InputError` for parts of a scene that are not available in three dimensions.
+
     They are a model other than a membrane, a centrifugal load, a pressure on an edge, a pinned node, a `Symmetry` of an
-    edge that does not lie in a plane normal to its axis, and thermal expansion together with heat conduction."""
+    edge that does not lie in a plane normal to its axis, and thermal expansion together with heat conduction.
+    """
     if scene.model.solid:
         raise InputError(f"Scene: model = {scene.model!r}: a sheet in three dimensions is a Membrane(): solids in three"
                          f" dimensions are not available yet")
@@ -129,7 +133,9 @@ def depends_on_direction(scene: Any, layer: str) -> bool:
 
 def check_laws(scene: Any) -> None:
     """Raise an `InputError` for an energy that depends on the direction in a membrane that wrinkles; collective.
-    Tension-field theory knows the relaxed energy of isotropic laws alone."""
+
+    Tension-field theory knows the relaxed energy of isotropic laws alone.
+    """
     if scene.model.wrinkles is None:
         return
     for name in scene.mesh.layers:
@@ -185,8 +191,10 @@ def _check_plane(scene: Any, support: Symmetry) -> None:
 
 def check_contact(scene: Any, contact: Any) -> None:
     """Check a contact of a sheet: its options, the size of its tool, and that the sheet starts outside it; collective.
+
     Raise `InputError` for options that three dimensions do not have, for sizes in different units of length, and for a
-    sheet inside the tool."""
+    sheet inside the tool.
+    """
     mesh, tool = scene.mesh, contact.tool
     if contact.on not in mesh.faces:
         raise InputError(f"{contact!r}: a surface in three dimensions touches with its"
@@ -224,7 +232,9 @@ def check_contact(scene: Any, contact: Any) -> None:
 
 def _check_between_nodes(contact: Any, mesh: SurfaceMesh, near: float) -> None:
     """Check that no corner of the tool's triangles lies behind a flat sheet, between its nodes; collective.
-    Raise `InputError` if one does. near: distance that is allowed, length."""
+
+    Raise `InputError` if one does. near: distance that is allowed, length.
+    """
     if not mesh.flat or not contact.tool.sized:
         return
     points, triangles = mesh.whole()

@@ -68,7 +68,8 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     def add_piece(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
         """Append a straight piece, or an arc about `centre`, from the last point to `point`, unless both coincide.
 
-        name: name of the boundary that the piece belongs to."""
+        name: name of the boundary that the piece belongs to.
+        """
         nonlocal last
         if math.dist(last, point) > 1e-12 * (a + b):
             found.append(Edge(last, point, centre, name))
@@ -166,7 +167,9 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
 
 def outline_edges(outline: Any, caller: str) -> list[Edge]:
     """Return the pieces of an outline, given by pieces or by the corners (x, y) of a polygon, length.
-    Raise `InputError` for another form, or for fewer than three corners."""
+
+    Raise `InputError` for another form, or for fewer than three corners.
+    """
     edges = as_list(caller, outline, "corners (x, y), or what fx.mesh.rectangle gives")
     if all(isinstance(edge, Edge) for edge in edges):
         return edges
@@ -178,8 +181,10 @@ def outline_edges(outline: Any, caller: str) -> list[Edge]:
 
 def chords(edges: list[Edge], caller: str) -> np.ndarray:
     """Return the corners of an outline with each arc divided into 8 chords, shape (n, 2), length.
+
     Raise `InputError` for two equal corners in succession, or for an outline that crosses or touches itself, for which
-    gmsh might not end."""
+    gmsh might not end.
+    """
     points = []
     for edge in edges:
         a, b = np.array(edge.start), np.array(edge.end)
@@ -197,8 +202,10 @@ def chords(edges: list[Edge], caller: str) -> np.ndarray:
 
 
 class _Size:
-    """Edge length of triangles, a number or a function of (x, y), for gmsh, which ignores exceptions: the first is
-    `refused`."""
+    """Edge length of triangles, a number or a function of (x, y), for gmsh.
+
+    gmsh ignores exceptions: the first is `refused`.
+    """
 
     def __init__(self, size: Any):
         self._size = size
@@ -217,7 +224,9 @@ class _Size:
 
     def callback(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
         """Return the edge length of triangles at a point (x, y), for gmsh; 1e22 where the user's function fails.
-        gmsh also gives `dim`, `tag`, `z` and its own `size`, which are not used."""
+
+        gmsh also gives `dim`, `tag`, `z` and its own `size`, which are not used.
+        """
         try:
             return self(x, y)
         except InputError as error:
@@ -226,7 +235,9 @@ class _Size:
 
     def area_and_size(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Divide a polygon, shape (n, 2), into m equal areas; return them and the edge lengths there, shape (m,) each.
-        With a constant edge length there is one piece."""
+
+        With a constant edge length there is one piece.
+        """
         y = np.roll(x, -1, axis=0)
         area = abs(np.sum(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])) / 2
         if self.constant:
@@ -289,7 +300,9 @@ def _grid(edges: list[Edge], size: _Size) -> Grid:
 
 def _reflected(grid: Grid, name: str) -> Grid:
     """Return the mesh of a sheet joined with its mirror image about a straight boundary, which disappears.
-    Raise `InputError` if it is not straight, or if its straight extension crosses or touches the sheet."""
+
+    Raise `InputError` if it is not straight, or if its straight extension crosses or touches the sheet.
+    """
     X, (sheet,) = grid.points, grid.layers.values()
     line = np.unique(grid.boundaries[name])
     middle, size = X[line].mean(0), 1e-9 * float(np.ptp(X, axis=0).max())

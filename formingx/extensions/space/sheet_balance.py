@@ -12,13 +12,15 @@ from ...results.evaluate.work import EnergyBalance
 
 class SheetBalance(EnergyBalance):
     r"""Energy balance of the states of one problem of a sheet in three dimensions.
+
     The contact forces t per area A absorb the energy
 
     .. math:: \sum_i \tfrac{1}{2} (A_i^a t_i^a + A_i^b t_i^b) \cdot (x_i^b - x_i^a)
 
     in a step from a to b, with the positions x relative to the tool. Contacts with friction lose it. Without friction,
     and where the sheet sticks, the penalty stores it ("bonds"). A point whose gap closed in the last step carries no
-    force yet."""
+    force yet.
+    """
 
     def _body_energies(self, a: Any, b: Any) -> dict[str, float]:
         found = super()._body_energies(a, b)

@@ -37,9 +37,11 @@ _LARGEST_TOOL = _DRAWN // _FRAMES[0]
 def view(path: Any, state: Any, file: Any, grid: float | None = None, camera: Any = None,
          values: np.ndarray | None = None, name: str = "") -> None:
     """Draw the whole part as PNG, completed by mirror images (rank 0 draws).
+
     grid: size of the squares of a grid printed on the flat sheet, length. camera: see `Path.view3d`. values: values of
     the triangles for the colours, shape (m,), and their `name`; None: wall over reference thickness. Raise `InputError`
-    without screen and Xvfb."""
+    without screen and Xvfb.
+    """
     file, wall = files.named("view3d", file, ".png"), wall_of(path, state)
     low, high = wall.deformed_points[:, 2].min(), wall.deformed_points[:, 2].max()
     default = (1.4, -2.6, 0.9) if not wall.flat else (0.8, -2.0, 3.6) if low < -high else (1.7, -2.4, 1.7)     # look in
@@ -68,7 +70,9 @@ def view(path: Any, state: Any, file: Any, grid: float | None = None, camera: An
 
 def add_part(plotter: Any, wall: Any, values: np.ndarray, images: Any, **style: Any) -> None:
     """Add a wall and its images to a pyvista plotter, coloured by values of the triangles, shape (m,).
-    images: pairs (scale, shift) of positions; style: arguments of `add_mesh`, with the colours by "ratio"."""
+
+    images: pairs (scale, shift) of positions; style: arguments of `add_mesh`, with the colours by "ratio".
+    """
     faces = np.column_stack([np.full(len(wall.triangles), 3), wall.triangles]).ravel()
     for scale, shift in images:
         surface = figures.pyvista().PolyData(wall.deformed_points * scale + shift, faces)
@@ -82,9 +86,11 @@ _LARGEST_MITRE = 3.0
 
 def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the closed surface of the whole part in a state, completed by mirror images.
+
     Points, shape (n, 3), length; triangles, outward, shape (m, 3); wall over reference wall there, shape (n,). Half of
     the wall lies on each side of the mid-surface: nodes move along their normals, farther at folds, to the volume of
-    the walls."""
+    the walls.
+    """
     wall, planes = wall_of(path, state), path.scene.symmetry
     on = [np.abs(wall.reference_points[:, plane.axis] - plane.position) < planes.near for plane in planes.planes]
     corners = wall.deformed_points[wall.triangles]
@@ -117,8 +123,10 @@ def solid(path: Any, state: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def shell_model(path: Any, file: Any, state: Any = None) -> None:
     """Write the modelled part as shell elements in an input file for Abaqus or CalculiX (rank 0 writes).
+
     Each triangle is an S3 element whose section thickness is its deformed wall thickness. The user adds the material
-    POLYMER, and constrains a half or a quarter at its planes of symmetry."""
+    POLYMER, and constrains a half or a quarter at its planes of symmetry.
+    """
     file, wall = files.named("shell_model", file, ".inp"), wall_of(path, state or path.last)
 
     def write(stream):
@@ -134,7 +142,9 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
 
 def report(path: Any, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
     """Write the report of a run in three dimensions as an HTML page, and return its path (rank 0 writes).
-    density: g/cm3, or None. trim: z of the plane at which the sheet is cut, length, or None."""
+
+    density: g/cm3, or None. trim: z of the plane at which the sheet is cut, length, or None.
+    """
     from .part import part
     wall, last, comm = path.wall(), path.last, path.problem.comm
     planes, record = path.scene.symmetry, of_path(path)
@@ -183,7 +193,9 @@ def report(path: Any, file: Any, title: str, failure: Any, units: Units, density
 
 def _parts_of_tools(path: Any, states: list[Any], units: Units) -> str:
     """Return an HTML table of the parts of unions in some states, with their share of the contact; "" without unions.
-    Forces are those of the whole part, along the travel of the tool, or along z if it is fixed."""
+
+    Forces are those of the whole part, along the travel of the tool, or along z if it is fixed.
+    """
     from .part import filling
     rows, factor = [], path.scene.symmetry_factor
     for face in path.problem.contacts:
@@ -199,8 +211,7 @@ def _parts_of_tools(path: Any, states: list[Any], units: Units) -> str:
 
 
 def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
-    """Return two charts of the cut through the thinnest triangle along the longer side of the part: its shape, and the
-    wall."""
+    """Return two charts, shape and wall, of the cut through the thinnest triangle along the longer side of the part."""
     thinnest = wall.middle[int(np.argmin(wall.wall))]
     axis = int(np.argmax(np.ptp(wall.deformed_points[:, :2], axis=0)))
     normal = np.eye(3)[1 - axis]
@@ -220,7 +231,9 @@ def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
 
 def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
     """Return the data that `report.js` draws: the sheet in each drawn state, and the tools.
-    record: numbers of the drawn states and travels of the tools."""
+
+    record: numbers of the drawn states and travels of the tools.
+    """
     walls = [wall_of(path, path.states[k]) for k in record.frames]
     ratio = [wall.to_nodes(wall.ratio) for wall in walls]
     shown = {units.label("wall"): [wall.at_nodes for wall in walls], "wall / original": ratio}

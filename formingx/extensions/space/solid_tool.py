@@ -126,7 +126,9 @@ class SolidTool:
 
 def nearest_of(parts: list[Distances]) -> Distances:
     """Return the distances of n points from the union of several solids, positive inside.
-    It is the largest distance from a solid, exact outside."""
+
+    It is the largest distance from a solid, exact outside.
+    """
     if len(parts) == 1:
         return parts[0]
     nearest = np.argmax([part.distance for part in parts], axis=0)
@@ -184,8 +186,10 @@ class Swept(SolidTool):
 
     def _profile_coordinate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the coordinate r of points, shape (n, 3), in the plane (r, z) of the profile, shape (n,), length.
+
         Also its gradient, shape (n, 3), and the curvature of the curve of constant r through each point, shape (n,),
-        1/length."""
+        1/length.
+        """
         way = np.zeros((len(x), 3))
         if self.kind == "extruded":
             axis = "yx".index(self.along)
@@ -233,7 +237,9 @@ class Swept(SolidTool):
 
     def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the vertices, shape (n, 3), length, and triangles, shape (m, 3), of a swept polyline.
-        outline: points (r, z), shape (k, 2), length."""
+
+        outline: points (r, z), shape (k, 2), length.
+        """
         rings = np.array([np.insert(self._ring(r), 2, z, axis=1) for r, z in outline])
         m, n = rings.shape[:2]
         row = np.arange(m * n).reshape(m, n)

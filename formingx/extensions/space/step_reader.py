@@ -19,9 +19,11 @@ _SMALLEST_TRIANGLE = 2e-3  # the same; at the tip of a cone the curvature would 
 
 def read_step(name: str, size: float | None, angle: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices, shape (n, 3), mm, triangles, shape (m, 3), and exact normals, shape (m, 3, 3), of a STEP file.
+
     Triangles are counter-clockwise from outside, normals point out of the solid, and gmsh converts lengths to mm. size:
     largest edge, mm; None: a quarter of the extent. angle: largest turn within a triangle, degrees. Raise `InputError`
-    if gmsh cannot read the file, or if it has no solid."""
+    if gmsh cannot read the file, or if it has no solid.
+    """
     options = {"General.NumThreads": 1.0, "Mesh.MeshSizeFromCurvature": 360.0 / angle,
                "Mesh.MeshSizeExtendFromBoundary": 0.0}
     if not os.path.isfile(name):
@@ -48,7 +50,9 @@ def read_step(name: str, size: float | None, angle: float) -> tuple[np.ndarray, 
 
 def _body(gmsh: Any, entity: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices, triangles and normals of a meshed solid (dimension, tag), as `read_step`.
-    gmsh is asked for normals at the parameters of its own nodes: it may find other parameters for a given point."""
+
+    gmsh is asked for normals at the parameters of its own nodes: it may find other parameters for a given point.
+    """
     tags, X, _ = gmsh.model.mesh.getNodes()
     row = np.zeros(int(tags.max()) + 1, dtype=int)
     row[tags.astype(int)] = np.arange(len(tags))
@@ -76,7 +80,9 @@ def _body(gmsh: Any, entity: tuple[int, int]) -> tuple[np.ndarray, np.ndarray, n
 
 def _turned(triangles: np.ndarray) -> np.ndarray:
     """Return the mask of the triangles to turn, so that all are oriented like their neighbours, shape (m,).
-    Each triangle has two nodes in a graph, as it is and turned. Two neighbours are connected as they fit."""
+
+    Each triangle has two nodes in a graph, as it is and turned. Two neighbours are connected as they fit.
+    """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     m = len(triangles)

@@ -87,7 +87,9 @@ class SheetStress(ColumnTable):
 
 def stress_of(path: Any, state: Any, depth: float | None) -> SheetStress:
     """Return the stresses of a sheet in a state, means over the thickness or those at a depth; collective.
-    Raise `InputError` for a stress without potential (K-BKZ), and for a depth that is not from 0 to 1."""
+
+    Raise `InputError` for a stress without potential (K-BKZ), and for a depth that is not from 0 to 1.
+    """
     if depth is not None and not 0 <= depth <= 1:
         raise InputError(f"Path.stress: depth = {depth!r}: must be from 0, the bottom face, to 1, the top face")
     problem, forms, comm = path.problem, path.problem.forms, path.problem.comm
@@ -136,7 +138,9 @@ def _evaluated(forms: Any, expression: Any, cells: np.ndarray, places: Any) -> n
 
 class _Layer:
     """Stresses of one layer in the present fields, entries 11, 22 and 12 in the axes of the deformed triangle.
-    cells: local numbers of the owned cells, shape (m,)."""
+
+    cells: local numbers of the owned cells, shape (m,).
+    """
 
     def __init__(self, forms: Any, terms: Any, cells: np.ndarray):
         self._forms, self._terms, self._cells = forms, terms, cells

@@ -61,7 +61,9 @@ Across a sheet of 75 degrees between its faces, in which a tenth has relaxed, 5 
 
 class Surface(Formulation):
     """Residual forms of a membrane in three dimensions; the only unknown field is the displacement.
-    thicknesses: {layer: reference thickness as a `Function`, length}."""
+
+    thicknesses: {layer: reference thickness as a `Function`, length}.
+    """
 
     singular_unloaded = True
     _on_tools: PressureOnTools | None = None
@@ -72,7 +74,9 @@ class Surface(Formulation):
 
     def carried_forces(self, face: Any, fields: np.ndarray, control: float) -> np.ndarray | float:
         """Return the pressure forces on a tool between the m contact points of a face, shape (m, 3), stress length^2.
-        They are 0 unless a pressure acts on a sheet that slides. fields: owned unknowns, shape (n,)."""
+
+        They are 0 unless a pressure acts on a sheet that slides. fields: owned unknowns, shape (n,).
+        """
         return 0.0 if self._on_tools is None else self._on_tools.carried_forces(face, fields, control)
 
     def _residual(self, body: Any) -> tuple[Any, Any, Any]:
@@ -129,7 +133,9 @@ class Surface(Formulation):
 
     def area_row(self, deformed: bool = False) -> Any:
         """Return the linear form (UFL) of the tributary areas of nodes, length^2, reference or deformed.
-        The area is in the first of the three entries of a node, the others are 0."""
+
+        The area is in the first of the three entries of a node, the others are 0.
+        """
         ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
         return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
 
@@ -176,7 +182,9 @@ class Surface(Formulation):
 
     def temperatures(self, terms: Any) -> np.ndarray:
         """Return the temperatures at the quadrature points of `terms`, now and before, shape (1 or 2, cells, q).
-        If the mean of the constants will do, the temperatures of the m points of a column follow in a fourth index."""
+
+        If the mean of the constants will do, the temperatures of the m points of a column follow in a fourth index.
+        """
         if self._columns is None:
             return super().temperatures(terms)
         layer, n = self._columns.layers[terms.names[0]], self.energy_depths
@@ -207,7 +215,9 @@ class Surface(Formulation):
 
     def _deformation_gradient(self) -> Any:
         """Return F of the incompressible membrane, rotated to upper triangular form (UFL, shape (3, 3)).
-        Its axes: along the deformed first edge, across it in the surface, and along the normal."""
+
+        Its axes: along the deformed first edge, across it in the surface, and along the normal.
+        """
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         f1, f2 = (F * t for t in self._axes[:2])
         n = ufl.cross(f1, f2)
@@ -216,12 +226,16 @@ class Surface(Formulation):
 
     def law_axes(self, material: Any, names: list[str]) -> Callable:
         """Return the function that refers F to directions of the surface, for an energy that depends on the direction.
-        The energies of other materials take F in the axes of each triangle."""
+
+        The energies of other materials take F in the axes of each triangle.
+        """
         return self._in_directions if depends_on_direction(self.scene, names[0]) else super().law_axes(material, names)
 
     def _in_directions(self, F: Any) -> Any:
         """Return an F of the axes of each triangle, referred to a first direction in the surface, normal and a second.
-        Its rows are the deformed first axis, the normal and the other axis (UFL, shape (3, 3))."""
+
+        Its rows are the deformed first axis, the normal and the other axis (UFL, shape (3, 3)).
+        """
         t1, t2, normal = self._axes
         d1, d2 = self._directions
         side = ufl.inner(normal, ufl.cross(d1, d2))          # -1 keeps det F positive
@@ -231,8 +245,10 @@ class Surface(Formulation):
     @property
     def _directions(self) -> tuple[Any, Any]:
         """Unit vectors in the surface to which laws refer (UFL, shape (3,) each).
+
         They are x and y on a flat sheet and on a horizontal triangle, else the steepest line upwards and the
-        horizontal."""
+        horizontal.
+        """
         x, y, z = (ufl.as_vector([float(i == k) for k in range(3)]) for i in range(3))
         if self.mesh.flat:
             return x, y
@@ -284,8 +300,10 @@ class Surface(Formulation):
 
 
 class _AlwaysAdmissible:
-    """Check of the volume ratio that every state passes, for membranes, whose volume ratio J is always above 0. It
-    takes the place of `Admissible`, the check for solids."""
+    """Check of the volume ratio for membranes, which every state passes, since J is always above 0.
+
+    It takes the place of `Admissible`, the check for solids.
+    """
 
     def holds(self) -> bool:
         """Return True: the volume ratio of a membrane is positive in every state."""
@@ -298,6 +316,7 @@ class _AlwaysAdmissible:
 
 def relaxed(F: Any) -> Any:
     r"""Return the F whose energy is the relaxed energy of tension-field theory (UFL, shape (3, 3)).
+
     Where the membrane is taut, it is F. Where it wrinkles, it is the stretch tensor U of simple tension with the larger
     principal stretch l1 of F, along the same direction; where both stretches are compressive, it is the identity. With
     the angle a of this direction from the first axis and l2 = l1^(-1/2)
@@ -305,7 +324,8 @@ def relaxed(F: Any) -> Any:
     .. math:: U = \frac{l_1 + l_2}{2} I + \frac{l_1 - l_2}{2}
         \begin{pmatrix} \cos 2a & \sin 2a \\ \sin 2a & -\cos 2a \end{pmatrix}
 
-    The direction matters for materials whose internal variables are tensors. F: upper triangular, third axis normal."""
+    The direction matters for materials whose internal variables are tensors. F: upper triangular, third axis normal.
+    """
     C11, C22, C12 = F[0, 0]**2, F[0, 1]**2 + F[1, 1]**2, F[0, 0] * F[0, 1]
     J = F[0, 0] * F[1, 1]
     squared = ((C11 - C22) / 2) ** 2 + C12**2
@@ -332,11 +352,14 @@ def smaller_stress(stretches: np.ndarray) -> np.ndarray:
     .. math:: \lambda_2^2 - (\lambda_1 \lambda_2)^{-2}
 
     stretches: principal stretches in the surface, the larger first, shape (n, 2). In compression it is negative for
-    other materials, too."""
+    other materials, too.
+    """
     return stretches[:, 1] ** 2 - stretches.prod(axis=1) ** -2
 
 
 def wrinkled(stretches: np.ndarray) -> np.ndarray:
     """Return the mask of points where a membrane wrinkles, shape (n,): `smaller_stress` is below -1e-3.
-    So the compression by elastic slip on a flat tool does not count."""
+
+    So the compression by elastic slip on a flat tool does not count.
+    """
     return smaller_stress(stretches) < -NEGLIGIBLE

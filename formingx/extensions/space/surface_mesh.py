@@ -167,7 +167,9 @@ class SurfaceMesh(Mesh):
 
 def closest_points(places: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the point of a surface closest to each of n places, shape (n, 3), its triangle (n,) and distance (n,).
-    places: shape (n, 3), length; corners of m triangles, shape (m, 3, 3), length."""
+
+    places: shape (n, 3), length; corners of m triangles, shape (m, 3, 3), length.
+    """
     edges = np.roll(corners, -1, axis=1) - corners
     normal = np.cross(edges[:, 0], edges[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -189,7 +191,9 @@ def closest_points(places: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray,
 
 def volume_within(points: np.ndarray, triangles: np.ndarray) -> float:
     """Return the volume inside a surface, closed by lids normal to z and planes x = 0 and y = 0, length^3.
-    triangles: shape (m, 3), counter-clockwise from outside."""
+
+    triangles: shape (m, 3), counter-clockwise from outside.
+    """
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     return float(np.einsum("mi,mi->", corners.mean(1)[:, :2], area[:, :2]) / 2)
@@ -202,8 +206,10 @@ def below(points: np.ndarray, triangles: np.ndarray, level: float) -> tuple[np.n
 
 def positive_part(corners: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the part of triangles in which a linear function is not negative.
+
     corners: shape (m, 3, 3), length; values at them, shape (m, 3). Vertices, shape (k, 3), length; triangles, shape (j,
-    3); for each of these the number of its triangle of the surface, shape (j,)."""
+    3); for each of these the number of its triangle of the surface, shape (j,).
+    """
     inside = values >= 0
     whole, cut = np.flatnonzero(inside.all(1)), np.flatnonzero(inside.any(1) & ~inside.all(1))
     first = np.where(inside[cut].sum(1) == 1, inside[cut].argmax(1), (~inside[cut]).argmax(1))    # alone on its side
@@ -221,7 +227,9 @@ def positive_part(corners: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, 
 def surface_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str, faces: tuple[str, str],
                  layers: Sequence[str] = ("sheet",), **more: Any) -> SurfaceMesh:
     """Return the distributed mesh of a surface, with its two faces among the boundaries; collective.
-    Rank 0 calls `make`; `faces[0]` is opposite to the normals. Raise `InputError` for invalid elements or names."""
+
+    Rank 0 calls `make`; `faces[0]` is opposite to the normals. Raise `InputError` for invalid elements or names.
+    """
     words = as_list(f"{what}: layers", layers, "names")
     if not words or len(set(words)) < len(words):
         raise InputError(f"{what}: layers = {layers!r}: must be at least one name, and each another")
@@ -231,7 +239,9 @@ def surface_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str, faces: tup
 def of_plain(plain: Mesh, faces: tuple[str, str] = ("inner", "outer"), layers: Sequence[str] = (),
              **more: Any) -> SurfaceMesh:
     """Return the mesh of a surface with the domain and the boundaries of a plain mesh of triangles.
-    `faces[0]` is opposite to the normals. Raise `InputError` for several layers, or for six-node triangles."""
+
+    `faces[0]` is opposite to the normals. Raise `InputError` for several layers, or for six-node triangles.
+    """
     if len(plain.layers) > 1 or cell_node_positions(plain.domain, own_cells(plain.domain)[:0]).shape[1] > 3:
         raise InputError(f"a surface in three dimensions consists of three-node triangles, and each layer covers all of"
                          f" it: this one has the layers {', '.join(map(repr, plain.layers))}: name one group")

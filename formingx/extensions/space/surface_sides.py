@@ -24,6 +24,7 @@ _NEAR = 1e-3               # distance of these points from a triangle, over the 
 
 class SurfaceSides:
     """Side of points of a surface: outside is the side of the face "top" or "outer".
+
     cells: shape (m, 3), counter-clockwise from outside; X: reference positions of nodes, shape (n, 3), length; planes:
     the `MirrorPlane`s of the scene; size: median edge, length.
 
@@ -53,8 +54,10 @@ class SurfaceSides:
 
     def within(self, x: np.ndarray, P: np.ndarray, beyond: bool) -> np.ndarray:
         """Return the mask of points, shape (n, 3), whose side is known; nodes P, shape (k, 3), length.
+
         A flat sheet has sides over its extent. A curved surface has them between its lids and planes of symmetry.
-        beyond: False to leave out points beyond the extent of a curved surface, which are outside."""
+        beyond: False to leave out points beyond the extent of a curved surface, which are outside.
+        """
         low, high = P.min(0), P.max(0)
         if self._flat:
             low[2], high[2] = -np.inf, np.inf
@@ -72,8 +75,10 @@ class SurfaceSides:
 
     def outside(self, x: np.ndarray, P: np.ndarray, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the masks of points that are outside, and of points whose ray crosses the surface, shape (n,) each.
+
         x: shape (n, 3), length. P: positions of the nodes, shape (k, 3), length. height: z of the point that has z = 0
-        here, length; the plane of a flat sheet is at 0."""
+        here, length; the plane of a flat sheet is at 0.
+        """
         y, Q = (np.ascontiguousarray(points @ self.axes.T) for points in (x, P))
         low, high = Q[:, :2].min(0), Q[:, :2].max(0)
         n = np.maximum(np.ceil((high - low) / self._size), 1).astype(int)
@@ -98,7 +103,9 @@ class SurfaceSides:
 
 def _outer_nodes(cells: np.ndarray, X: np.ndarray, planes: tuple[Any, ...]) -> np.ndarray:
     """Return the nodes at the edge of a surface, without its cuts at planes of symmetry, shape (k,).
-    cells: shape (m, 3). X: reference positions, shape (n, 3), length."""
+
+    cells: shape (m, 3). X: reference positions, shape (n, 3), length.
+    """
     _, edges, _, times = edges_of(cells)
     outer = edges[times == 1]
     for plane in planes:

@@ -45,7 +45,9 @@ def files_of(tool: Any) -> list[Triangulated]:
 @register("start")
 def unresolved_files(body: Any) -> Iterator[Finding]:
     """Yield a finding for each STL file that does not resolve its surface: sharp edges across triangles, or noise.
-    The fitted normals then satisfy the equations of smooth edges badly (`Triangulated.roughness`)."""
+
+    The fitted normals then satisfy the equations of smooth edges badly (`Triangulated.roughness`).
+    """
     for contact in body.scene.contacts:
         for tool in files_of(contact.tool):
             ratio, place = tool.roughness
@@ -61,7 +63,9 @@ def unresolved_files(body: Any) -> Iterator[Finding]:
 @register("start")
 def coarse_fillets(body: Any) -> Iterator[Finding]:
     """Yield a finding for each tool with a concave fillet below the median edge of the sheet's triangles; collective.
-    The sheet then turns by about a radian from triangle to triangle."""
+
+    The sheet then turns by about a radian from triangle to triangle.
+    """
     scene = body.scene
     if scene.kinematics.components != 3:
         return
@@ -84,7 +88,9 @@ def coarse_fillets(body: Any) -> Iterator[Finding]:
 
 def _smallest_edge(tool: Any, convex: bool) -> float:
     """Return the smallest fillet of the edges where parts of a tool meet, length; inf without one.
-    convex: True to count the edges of intersections, which are convex, with the concave ones of unions."""
+
+    convex: True to count the edges of intersections, which are convex, with the concave ones of unions.
+    """
     parts = _members(tool)
     own = [tool.fillet] if parts and tool.fillet > 0 and (convex or isinstance(tool, Union)) else []
     return float(min([*own, *(_smallest_edge(part, convex) for part in parts)], default=np.inf))
@@ -92,8 +98,10 @@ def _smallest_edge(tool: Any, convex: bool) -> float:
 
 def _smallest_fillet(tool: Any, nodes: np.ndarray | None, length: float) -> tuple[float, np.ndarray | None]:
     """Return the radius of the smallest concave fillet of a tool, length, and a place there, shape (3,), or None.
+
     nodes: of a flat sheet, shape (n, 3), else None: files are not examined. length: median edge of its triangles.
-    Without a small fillet the radius is inf."""
+    Without a small fillet the radius is inf.
+    """
     if isinstance(tool, Swept):
         arcs = (piece for piece in tool.profile.pieces if isinstance(piece, Arc) and piece.radius > 0)
         concave = [arc.radius for arc in arcs if tool.profile.signed_distance(arc.centre[None])[0] < 0]
@@ -117,7 +125,9 @@ def _smallest_fillet(tool: Any, nodes: np.ndarray | None, length: float) -> tupl
 @register("start")
 def sharp_ridges(body: Any) -> Iterator[Finding]:
     """Yield a finding for each contact that slides into a sharp ridge between the sides of a tool round a rectangle.
-    The sides meet sharply where the profile is narrower than the corners: the normal of the tool jumps there."""
+
+    The sides meet sharply where the profile is narrower than the corners: the normal of the tool jumps there.
+    """
     for contact in body.scene.contacts:
         for _, places, advice in _ridges(contact):
             ends = " to ".join(map(coordinates, places[[0, -1]]))
@@ -180,7 +190,9 @@ def _inner_radius(places: np.ndarray, part: Swept) -> float:
 @register("start")
 def rough_thickness(body: Any) -> Iterator[Finding]:
     """Yield a finding for each layer whose thickness the triangles of the sheet do not resolve; collective.
-    The membrane uses linear thickness in each triangle, the wall the value in its middle. Both must agree."""
+
+    The membrane uses linear thickness in each triangle, the wall the value in its middle. Both must agree.
+    """
     scene = body.scene
     if scene.kinematics.components != 3:
         return

@@ -112,7 +112,9 @@ class Triangulated(SolidTool):
 
     def _covered(self, middle: np.ndarray) -> np.ndarray:
         """Return the mask of the triangles that lie inside another body of the tool, shape (m,).
-        middle: a point slightly outside each triangle, shape (m, 3), length."""
+
+        middle: a point slightly outside each triangle, shape (m, 3), length.
+        """
         found = np.zeros(self.triangles, dtype=bool)
         for k, rows in enumerate(self._bodies):
             for other in (*self.surfaces[:k], *self.surfaces[k + 1:]):

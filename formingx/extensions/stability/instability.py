@@ -211,7 +211,9 @@ class StabilityAnalysis:
 
     def examine(self, modes: Iterable[float], states: Any) -> Stability:
         """Count unstable modes in states of the path, and locate the critical points between them.
-        `modes` are wave numbers; `states` is a number of evenly spaced states, "all" or a list of states."""
+
+        `modes` are wave numbers; `states` is a number of evenly spaced states, "all" or a list of states.
+        """
         numbers = wave_numbers(self._path.problem.scene, modes)
         chosen = _selected_states(self._path, states)
         counts: dict[ModeClass, list[int]] = {}
@@ -237,7 +239,9 @@ class StabilityAnalysis:
 
     def _locate(self, a: State, b: State, kind: ModeClass, unstable_modes: Any) -> list[CriticalPoint]:
         """Return the critical points of one kind of modes between two states, each located between neighbouring states.
-        `unstable_modes` is a function of state and kind that returns the number of unstable modes."""
+
+        `unstable_modes` is a function of state and kind that returns the number of unstable modes.
+        """
         if unstable_modes(a, kind) == unstable_modes(b, kind):
             return []
         segment = self._path.record.segment(a)
@@ -258,7 +262,9 @@ class StabilityAnalysis:
 
     def _is_limit_point(self, segment: Any, found: LocatedPoint) -> bool:
         """Return True if the mode of a located point is nearly parallel to the path tangent, as at a limit point.
-        segment: the `Segment`, the part of the path on one mesh."""
+
+        segment: the `Segment`, the part of the path on one mesh.
+        """
         x, direction, problem = found.x, found.left.direction, segment.problem
         a, b = problem.x.duplicate(), problem.x.duplicate()
         a.array_w[:], b.array_w[:] = x, direction
@@ -269,7 +275,9 @@ class StabilityAnalysis:
 
     def _critical_point(self, segment: Any, found: LocatedPoint, limit: bool) -> CriticalPoint:
         """Return the `CriticalPoint` of a located point, with the mode at the nodes of all ranks.
-        `limit` is True for a limit point."""
+
+        `limit` is True for a limit point.
+        """
         comm, nodes = segment.problem.comm, self.modes_of(segment).variation.nodes
         points, amplitudes = gathered(comm, nodes), gathered(comm, found.mode)
         size = np.linalg.norm(amplitudes, axis=1)
@@ -361,8 +369,10 @@ def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
 
 def wave_numbers(scene: Any, modes: Any) -> list[float]:
     """Return the wave numbers that a user gave as a list without duplicates (in plane strain per length).
+
     None, a negative or fractional number of waves, and waves shorter than the edges of the elements are an
-    InputError."""
+    InputError.
+    """
     try:
         numbers = [finite("stability: modes", n) for n in modes]
     except TypeError:
@@ -382,7 +392,9 @@ def wave_numbers(scene: Any, modes: Any) -> list[float]:
 
 def _selected_states(path: Any, states: Any) -> list[State]:
     """Return the states to examine, in order along the path, without limit points unless they are given.
-    `states` is a number of evenly spaced states with both ends of the path, "all", or states of the path."""
+
+    `states` is a number of evenly spaced states with both ends of the path, "all", or states of the path.
+    """
     regular = [s for s in path.states if s.kind != "limit point"]
     if isinstance(states, State | list | tuple):
         given = as_list("stability: states", [states] if isinstance(states, State) else states, "states of the path")

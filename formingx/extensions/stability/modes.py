@@ -117,6 +117,7 @@ class _ModesOfState(NamedTuple):
 
 class Modes:
     """Modes of the second variation in the states of a problem: their number, and critical points between two states.
+
     A membrane, an elastic support, or a load without a second variation is an InputError.
 
     Attributes:
@@ -145,8 +146,10 @@ class Modes:
         return self._solver.negative_pivots() - self.variation.negative_pivots
 
     def locate(self, a: State, b: State, kind: ModeClass, index: int) -> LocatedPoint:
-        """Locate the critical point between states a and b at which eigenvalue number `index` (ascending) is 0. Counts
-        of unstable modes bracket it; inside, the eigenvalues of one mode, tracked by its shape, predict it."""
+        """Locate the critical point between states a and b at which eigenvalue number `index` (ascending) is 0.
+
+        Counts of unstable modes bracket it; inside, the eigenvalues of one mode, tracked by its shape, predict it.
+        """
         samples = [self._modes_of(0.0, a, kind, index), self._modes_of(1.0, b, kind, index)]
         (low, high), settings = samples, self._locating
         becomes_unstable, solved, slow = high.unstable > low.unstable, True, 0
@@ -194,7 +197,9 @@ class Modes:
 
     def _track(self, samples: list[_ModesOfState], end: _ModesOfState, index: int) -> list[tuple[float, float]]:
         """Return (fraction, eigenvalue) of one mode in the samples in which it is found by its shape.
-        The mode has number `index` in the state `end`, in which it is unstable; fractions are positions from 0 to 1."""
+
+        The mode has number `index` in the state `end`, in which it is unstable; fractions are positions from 0 to 1.
+        """
         mode, found = self._mode_of_index(end, index), []
         for sample in samples:
             overlaps = [abs(self._inner(mode, other)) for other in sample.modes]
@@ -203,8 +208,10 @@ class Modes:
         return found
 
     def _state_between(self, a: State, b: State, fraction: float) -> State:
-        """Solve for the state at a fraction (0 to 1) of the way from state a of the path to state b. `Failure` reports
-        no convergence, or convergence to another branch."""
+        """Solve for the state at a fraction (0 to 1) of the way from state a of the path to state b.
+
+        `Failure` reports no convergence, or convergence to another branch.
+        """
         if self.problem.history.path_dependent:
             raise Failure("with a history the state between two others depends on the steps", [])
         with self.problem.state_context(a):
@@ -219,8 +226,10 @@ class Modes:
 
     def _lanczos(self, number: int) -> tuple[Array, Array]:
         """Return the eigenvalues of K x = value M x nearest to 0, ascending, and their modes, shape (number, n).
+
         K is the second variation, M the lumped mass, which is 0 for pressures, so all vectors lie in the range of K^-1
-        M. Rigid motions are removed, and vectors are orthogonalised fully."""
+        M. Rigid motions are removed, and vectors are orthogonalised fully.
+        """
         variation = self.variation
         removed: list[Array] = []
         for mode in variation.rigid_motions:
@@ -281,7 +290,9 @@ class Modes:
 
 def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
     """Return the fraction of a step at which an eigenvalue is 0, by inverse interpolation; None out of bounds.
-    At most four (fraction, eigenvalue) pairs of smallest magnitude are used."""
+
+    At most four (fraction, eigenvalue) pairs of smallest magnitude are used.
+    """
     known = sorted(values, key=lambda entry: abs(entry[1]))[:4]
     for n in range(len(known), 1, -1):
         s, f = (np.array([entry[k] for entry in known[:n]]) for k in (0, 1))

@@ -44,8 +44,10 @@ _FREE_MOTION_FORCE = 1e-6
 
 class _BodyWithMode(LoadedBody):
     """Loaded body with a circumferential mode, as `Load.mode_work` expects it.
+
     The mode has displacement amplitudes (u_r, u_z, u_hoop) (UFL, shape (3,), length), `dmode` is their variation, and H
-    the change of F (UFL, shape (3, 3))."""
+    the change of F (UFL, shape (3, 3)).
+    """
 
     def __init__(self, forms: Any, mode: Any, dmode: Any, H: Any):
         super().__init__(forms)
@@ -54,6 +56,7 @@ class _BodyWithMode(LoadedBody):
 
 class SecondVariation:
     """Second variation of the energy of a solid at the present state of its problem, for one wave number n at a time.
+
     A mode is u_r = U cos(n theta), u_z = W cos(n theta), u_theta = V sin(n theta), p = Q cos(n theta). In plane strain
     k x3 replaces n theta. Its unknowns are U, W, V + m U and Q at the nodes, with m = 1 for n = 1 and 0 else. A mode
     antisymmetric about a symmetry plane is possible if the support has `mirror=True`. A membrane, an elastic support,
@@ -92,8 +95,10 @@ class SecondVariation:
 
     def fill(self, number: float, antisymmetric_about: str | None = None) -> Any:
         """Assemble and return `matrix` at the present state for the modes of a wave number and symmetry.
+
         In plane strain the number is a wave number along the depth, 1/length. Modes may be antisymmetric about a
-        symmetry plane, given by name."""
+        symmetry plane, given by name.
+        """
         problem, m = self.problem, float(self._axisymmetric and number == 1)
         self._number.value, self._m.value = number, m
         self._constrained = self._find_constrained(number, antisymmetric_about)
@@ -135,7 +140,9 @@ class SecondVariation:
 
     def _find_rigid(self) -> list[np.ndarray]:
         """Return the rigid motions of the present wave number that constraints leave free and that cause no force.
-        They are modes of unit Euclidean norm, locally owned entries."""
+
+        They are modes of unit Euclidean norm, locally owned entries.
+        """
         kinematics, owned = self.problem.scene.kinematics, self._constrained[self._constrained < self._owned]
         R = np.array([self._unknowns_of(mode) for mode in kinematics.rigid_modes(float(self._number.value))])
         if not len(R):
@@ -148,7 +155,9 @@ class SecondVariation:
 
     def _moves_freely(self, mode: np.ndarray) -> bool:
         """Return True if a rigid motion causes no force: if its product with the second variation `matrix` is 0. mode:
-        the rigid motion, locally owned entries, shape (n,)."""
+
+        the rigid motion, locally owned entries, shape (n,).
+        """
         x, y, diagonal = self.matrix.createVecRight(), self.matrix.createVecRight(), self.matrix.getDiagonal()
         x.array_w[:] = mode
         self.matrix.mult(x, y)
@@ -161,8 +170,10 @@ class SecondVariation:
 
     def _constrain_rigid(self) -> None:
         """Constrain one unknown in `matrix` for each rigid motion that supports and contacts leave free.
+
         It is the unknown in which the motion is largest. Before it is chosen, multiples of the earlier motions are
-        subtracted from the motion, so that it vanishes in the unknowns that are constrained already."""
+        subtracted from the motion, so that it vanishes in the unknowns that are constrained already.
+        """
         first, remaining = self.matrix.getOwnershipRange()[0], [mode.copy() for mode in self.rigid_motions]
         rows = []
         while remaining:
@@ -218,7 +229,9 @@ class SecondVariation:
 
     def _number_unknowns(self) -> None:
         """Set the nodes, their unknowns, and the map from unknowns of the problem to unknowns of a mode.
-        The unknowns of a node are the amplitudes U, W and V of its radial, axial and hoop displacement."""
+
+        The unknowns of a node are the amplitudes U, W and V of its radial, axial and hoop displacement.
+        """
         forms, problem = self._forms, self.problem
         index_map, old, new = self.space.dofmap.index_map, forms.space, self.space
         self._owned, size = index_map.size_local, index_map.size_local + index_map.num_ghosts
@@ -262,7 +275,9 @@ class SecondVariation:
 
     def _dofs(self, component: int, item: Any) -> np.ndarray:
         """Return the local numbers of the unknowns that a support constrains, with ghosts.
-        Component 0 is U (radial), 1 is W (axial), 2 the third unknown of the mode, V + m U."""
+
+        Component 0 is U (radial), 1 is W (axial), 2 the third unknown of the mode, V + m U.
+        """
         space, forms = self.space.sub(0).sub(component), self._forms
         if item.on is not None:
             return fem.locate_dofs_topological(space, 1, forms.mesh.facets_of(item.on))
@@ -272,8 +287,10 @@ class SecondVariation:
 
     def _find_constrained(self, number: float, antisymmetric_about: str | None) -> np.ndarray:
         """Return the local numbers of the constrained unknowns of modes, with ghosts.
+
         A boundary or node that is constrained in r and in z, such as a clamped rim or a fixed node, is also constrained
-        round the axis."""
+        round the axis.
+        """
         problem, constrained, supports = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, scene_item in enumerate(problem.scene.items):
             items = [] if i in problem.setting.inactive else self._forms.constraints(scene_item)
@@ -301,8 +318,10 @@ class SecondVariation:
 
     def _mean_rows(self) -> Iterator[tuple[int, np.ndarray, np.ndarray]]:
         """Yield (item number, row of each constraint of a mean displacement, row to subtract from it for one wave).
+
         Both rows have the owned unknowns. A mean radial and axial constraint also fixes the mean V; the third unknown
-        is V + U for one wave, so U is subtracted."""
+        is V + U for one wave, so U is subtracted.
+        """
         forms, problem = self._forms, self.problem
         n = problem.n_owned
         for number, scene_item in enumerate(problem.scene.items):
@@ -319,7 +338,9 @@ class SecondVariation:
 
     def _contact_stiffness(self, contact: Any, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
         """Return the unknowns, shape (n, k), and stiffness matrices, shape (n, k, k), of the n points of a contact.
-        The k unknowns of a point are U and W of its nodes, then their third unknowns V + m U."""
+
+        The k unknowns of a point are U and W of its nodes, then their third unknowns V + m U.
+        """
         plane, turn = contact.mode_stiffness(fields, self.problem.control)
         dofs = self._to_mode[contact.rule.dofs]
         k = dofs.shape[1]
@@ -332,8 +353,10 @@ class SecondVariation:
 
     def _guided_stiffness(self, fields: np.ndarray, m: float) -> tuple[np.ndarray, np.ndarray]:
         """Return unknowns (n, 3) and stiffness matrices (n, 3, 3) from support forces f of nodes fixed in r alone.
+
         A hoop displacement V moves such a node along a circle, inwards by V^2/(2 r), so the second variation is -f
-        V^2/r. The third unknown is V + m U."""
+        V^2/r. The third unknown is V + m U.
+        """
         r = self._X[:, 0] + self._forms.length * fields[self._old[:, 0]]
         constrained = np.zeros(len(self._V_of), dtype=bool)
         constrained[self._constrained] = True
@@ -347,8 +370,10 @@ class SecondVariation:
 
     def _unknowns_of(self, mode: Any) -> np.ndarray:
         """Return a rigid motion as a mode, locally owned entries, shape (n,).
+
         mode: function from deformed positions, shape (k, 2), length, to radial, axial and hoop amplitudes, shape (k,
-        3)."""
+        3).
+        """
         forms, fields = self._forms, self.problem.x.array_r
         u = forms.length * fields[self._old]
         values = mode(self._X + u) / forms.length

@@ -23,7 +23,9 @@ def draw(point: Any, file: Any, scale: float | None) -> None:
 
 def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
     """Return for each boundary deformed positions (m, 2), length, and amplitudes U, W, V (m, 3); collective.
-    The axis of an axisymmetric body is left out."""
+
+    The axis of an axisymmetric body is left out.
+    """
     path, state = point.path, point.state
     segment = path.record.segment(point.left)
     mesh = segment.problem.scene.mesh
@@ -42,8 +44,10 @@ def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
 
 def _draw(point: Any, lines: list, file: Any, scale: float | None) -> None:
     """Draw the surface that the outlines sweep round the axis, or along the depth in plane strain, to a PNG file.
+
     Lines are (positions (m, 2), amplitudes (m, 3)); `scale` is the largest mode displacement over the body size, None
-    for at most 0.15."""
+    for at most 0.15.
+    """
     pyvista = figures.pyvista()
     axisymmetric = point.path.problem.scene.kinematics.axisymmetric
     everything = np.vstack([line for line, _ in lines])

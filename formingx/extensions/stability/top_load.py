@@ -239,7 +239,9 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
 
 def _press(scene: Scene, travel: float, step: StepControl) -> tuple[Path, str]:
     """Return the path of a neck that moves by `travel` (length), and the reason why it ended before, or "".
-    A run that fails before its second state raises a ConvergenceError."""
+
+    A run that fails before its second state raises a ConvergenceError.
+    """
     try:
         return trace(scene, until=travel_to(travel), progress=False, step=step), ""
     except ConvergenceError as error:
@@ -256,7 +258,9 @@ def _default_modes(scene: Scene, slender: float) -> list[float]:
 
 def _slenderness(scene: Scene) -> float:
     """Return the largest ratio of radius and wall of a body; collective.
-    The wall at the middle of an edge is the distance along the inner normal to the halves of the other edges."""
+
+    The wall at the middle of an edge is the distance along the inner normal to the halves of the other edges.
+    """
     edges = Outline(Problem(scene).forms).reference_edges
     a, b, middle = edges.transpose(1, 0, 2)
     along = (b - a) / np.linalg.norm(b - a, axis=1)[:, None]

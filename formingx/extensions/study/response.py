@@ -45,7 +45,9 @@ class Sensitivities(NamedTuple):
 
 def sobol(runs: Sequence[Any], variables: Sequence[str], measure: str) -> Sensitivities:
     """Return the Sobol indices of a response that is fitted to runs, of second order, or of first with few runs.
-    No varying variable, too few runs, or a measure equal in all runs is an InputError."""
+
+    No varying variable, too few runs, or a measure equal in all runs is an InputError.
+    """
     from scipy import stats
     names = [name for name in variables if np.ptp([run.values[name] for run in runs] or [0.0]) > 0]
     x = np.array([[run.values[name] for name in names] for run in runs], float)

@@ -17,7 +17,9 @@ from .task import StudyRun, Task
 
 def prepare_folder(folder: FilePath, task: Task, variables: list[str]) -> FilePath:
     """Make the folder of a study, or check that an existing folder belongs to it, and return its path.
-    The names of variables and of the task's functions must be those stored; another study is an InputError."""
+
+    The names of variables and of the task's functions must be those stored; another study is an InputError.
+    """
     about = {"study": 1, "build": getattr(task.build, "__qualname__", ""), "variables": variables,
              "measures": list(task.measures)}
     file = folder / "study.json"
@@ -34,8 +36,10 @@ def prepare_folder(folder: FilePath, task: Task, variables: list[str]) -> FilePa
 
 def read(folder: FilePath, variables: list[str]) -> list[StudyRun]:
     """Return the runs stored in the folder of a study, one for each set of values, in the order of storing.
+
     A run that failed by a fault of the script is repeated by the study; its second run replaces it. An unreadable file
-    is an InputError."""
+    is an InputError.
+    """
     found: list[StudyRun] = []                                  # of runs with equal values the first final one counts
     for file in sorted(_files(folder)):
         try:

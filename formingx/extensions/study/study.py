@@ -81,7 +81,9 @@ class Study(ColumnTable):
 
     def _measures_of_goal(self, a: str | None, b: str | None) -> tuple[str, str]:
         """Return the names of two measures; by default the first two of the goal.
-        One measure alone, or none with fewer than two in the goal, is an InputError."""
+
+        One measure alone, or none with fewer than two in the goal, is an InputError.
+        """
         if a is not None and b is not None:
             return a, b
         if a is not None or b is not None or len(self.goal) < 2:
@@ -372,7 +374,9 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
 
 def _measures(build: Any, measures: Any) -> dict[str, Measure]:
     """Return `measures` as a new dict of functions and column names, after a check of it and of `build`.
-    An InputError names what is no function or no column."""
+
+    An InputError names what is no function or no column.
+    """
     if not callable(build):
         raise InputError(f"study: build = {build!r}: must be a function of the variables that gives back a path")
     if not isinstance(measures, Mapping) or not measures or not all(callable(m) or isinstance(m, str)

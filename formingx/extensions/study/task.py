@@ -44,15 +44,19 @@ class StudyRun:
 
 
 class Task(NamedTuple):
-    """Task of one process: it runs the user's function `build` for a set of values, and evaluates the measures of the
-    run. measures: {name: function of the path, or name of a column}."""
+    """Task of one process: a run by the user's function `build` for a set of values, and its measures.
+
+    measures: {name: function of the path, or name of a column}.
+    """
 
     build: Callable[..., Any]
     measures: dict[str, Measure]
 
     def __call__(self, values: dict[str, float]) -> StudyRun:
         """Run `build` with values of the variables; return its measures, or the reason for its failure.
-        values: {variable of the study: its value in this run}."""
+
+        values: {variable of the study: its value in this run}.
+        """
         began, log, log_filter = time.perf_counter(), logging.getLogger("formingx"), _RunLogFilter(values)
         log.addFilter(log_filter)
         try:
@@ -72,7 +76,9 @@ class Task(NamedTuple):
 
 class _RunLogFilter(logging.Filter):
     """Log filter that adds the variables of a run to its log records and collects its warnings; for one thread.
-    `values` is {variable of the study: its value in this run}."""
+
+    `values` is {variable of the study: its value in this run}.
+    """
 
     def __init__(self, values: dict[str, float]):
         super().__init__()
@@ -95,7 +101,9 @@ def as_text(numbers: Mapping[str, float]) -> str:
 
 def completed_runs(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRun]:
     """Run a task with sets of values, the first one alone, and yield all runs as they finish, also failed ones.
-    The pool is an executor of `concurrent.futures`."""
+
+    The pool is an executor of `concurrent.futures`.
+    """
     for batch in (cases[:1], cases[1:]):
         jobs: dict[Any, dict] = {pool.submit(task, case): case for case in batch}
         for job in futures.as_completed(list(jobs)):

@@ -74,7 +74,9 @@ class Depth(NamedTuple):
 
 class AdmissibilityCheck:
     """Check of the states of one problem; an inadmissible state satisfies the equations, but no real body can have it.
-    Examples are inverted elements, a face inside a tool, or tool forces of points that penetrate the tool too far."""
+
+    Examples are inverted elements, a face inside a tool, or tool forces of points that penetrate the tool too far.
+    """
 
     def __init__(self, problem: Any):
         self._problem, self._solid = problem, problem.scene.model.solid
@@ -86,9 +88,11 @@ class AdmissibilityCheck:
 
     def findings(self, state: State) -> list[Finding]:
         """Return findings on penetration of the tools in an admissible state, empty if all are small; collective.
+
         A warning in a section: penetration changes a tool force by more than 0.2 % (`WARNED_ERROR`), or the face is
         deeper than a tenth of the thickness (`CUT`). "serious" in three dimensions: a point deeper than a tenth of
-        `FaceContact.reference_length`."""
+        `FaceContact.reference_length`.
+        """
         if not self._solid:
             deepest = self._deepest_points(state, lambda contact: CUT * contact.reference_length)
             return [Finding("serious", deep.name, f"{deep.words}: shorter steps (StepControl(length=...)), or a larger"
@@ -159,8 +163,10 @@ class AdmissibilityCheck:
 
     def _deepest(self, edges: np.ndarray, lengths: np.ndarray, state: State, on_face: bool) -> Iterator[Depth]:
         """Yield for each active tool of a section the deepest point of the boundary in it, if deeper than allowed.
+
         Edges (m, 3, 2) have first end, last end and middle, lengths (m,); no point is farther from these than max
-        |dx/ds| / 4, so most edges are skipped. `on_face` takes only the face towards the tool, with the limit `CUT`."""
+        |dx/ds| / 4, so most edges are skipped. `on_face` takes only the face towards the tool, with the limit `CUT`.
+        """
         a, b, middle = edges.transpose(1, 0, 2)
         slopes = np.linalg.norm([4 * middle - 3 * a - b, a - 4 * middle + 3 * b], axis=-1)
         for contact, face in zip(self._problem.contacts, self._faces):
@@ -181,7 +187,9 @@ class AdmissibilityCheck:
 
     def _deepest_points(self, state: State, allowed: Callable[[Any], Any]) -> Iterator[Depth]:
         """Yield for each tool in three dimensions the deepest contact point, if it is deeper than allowed; collective.
-        `allowed` returns the limit of a `FaceContact` for its n contact points, shape (n,) or a number, length."""
+
+        `allowed` returns the limit of a `FaceContact` for its n contact points, shape (n,) or a number, length.
+        """
         if self._problem.scene.kinematics.components < 3:
             return
         with self._problem.state_context(state) as problem:
@@ -196,8 +204,10 @@ class AdmissibilityCheck:
 
     def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield for each tool the edge with the largest penetration over wall, if it exceeds the limit.
+
         Edges have shape (m, 3, 2), lengths (m,). The penetration is the largest one of three nodes; contact points must
-        be nodes."""
+        be nodes.
+        """
         weight, reference = self._problem.scene.kinematics.weight, self._outline.reference_edges
         for contact, face in zip(self._problem.contacts, self._faces):
             if not contact.active or contact.contact.points != "nodes" or not face.any():
@@ -225,13 +235,15 @@ def _allowed_penetration(contact: Any) -> np.ndarray:
 
 def _force_error(contact: Any, state: State, images: int) -> float:
     r"""Return the estimated relative error of the force F on a moving tool due to penetration; collective.
+
     Penetration stores the energy E. It adds about 2 E/F to the travel t of the tool at this force. With the strain
     energy W of the body and c = `AdmissibilityLimits.largest_energy_ratio`, the estimate is
 
     .. math:: \min\left(\frac{2 E}{F^2} \left|\frac{dF}{dt}\right|, \; c \, \frac{E}{W}\right)
 
     E/W is returned if it is below 0.02 %, a tenth of `WARNED_ERROR`, or if F or the change of t is 0. For a fixed tool
-    0 is returned. `state` has the column "strain_energy" of the whole part, which is `images` modelled bodies."""
+    0 is returned. `state` has the column "strain_energy" of the whole part, which is `images` modelled bodies.
+    """
     if not contact.contact.driven:
         return 0.0
     energy = resultants.energy(contact, state.x, state.control)

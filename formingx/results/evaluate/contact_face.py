@@ -50,6 +50,7 @@ class ContactTable(ColumnTable):
 
 class ContactFace:
     """Contact pressure, friction and gap of one `FaceContact`, at the contact points of all ranks.
+
     Creating it and all of its methods are collective.
 
     Attributes:
@@ -89,7 +90,9 @@ class ContactFace:
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
         """Return deformed over reference area at each contact point from deformed positions (n, 2), shape (n,).
-        A node that two edges share gets the mean of the ratios of both edges."""
+
+        A node that two edges share gets the mean of the ratios of both edges.
+        """
         n, reference, now = len(points), self.reference_points[self._edges], points[self._edges]
         ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._reference_tangents, axis=-1)
         if self._path.problem.scene.kinematics.dimension_of_volume == 3:
@@ -113,8 +116,10 @@ class ContactFace:
 
 def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
     """Return the `FaceContact` objects of a tool, one for each face.
+
     The tool is given as its name or that of a face, as `Tool`, `Contact`, or None for the only one. Others are an
-    InputError."""
+    InputError.
+    """
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
              or tool is c.contact.tool or tool is c.contact]

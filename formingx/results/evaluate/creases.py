@@ -35,8 +35,10 @@ class Crease(NamedTuple):
 
 def deepest(path: Any) -> Crease | None:
     """Return the most compressed part of the faces that stick to tools in the last state; collective.
+
     Parts nearer than a thickness to the outer end are left out, since the corner of a clamp is singular. None without a
-    sticking contact in a section."""
+    sticking contact in a section.
+    """
     scene = path.problem.scene
     names = {contact.on for contact in scene.contacts if contact.sticks}
     pair = next((pair for pair in FACES if all(name in scene.mesh.boundaries for name in pair)), None)

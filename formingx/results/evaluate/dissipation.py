@@ -8,13 +8,15 @@ from ...solve.state import State
 
 def dissipated_energy(segment: Segment, states: list[State], power: Quantity) -> float:
     r"""Return the energy that materials dissipate between the last two of given states; collective.
+
     The dissipated power D is integrated over the process time t along the parabola through three values:
 
     .. math:: \int_{t_0}^{t_1} D \, dt
 
     The third value lies between both states. There the unknowns are interpolated, and the history variables are
     advanced from the first state. The path has successive states of one segment, at least two, with the column
-    "dissipated_power", which `power` evaluates."""
+    "dissipated_power", which `power` evaluates.
+    """
     before, state = states[-2:]
     # with new step data only round-off is between the times: the body does not move
     if before.setting != state.setting or not before.time < state.time:

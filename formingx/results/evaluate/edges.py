@@ -28,9 +28,10 @@ class SharpEdge(NamedTuple):
 
 
 def coarsest(path: Any, state: Any) -> SharpEdge | None:
-    """Return the tool edge at which the tool normal turns most between two neighbouring contact points, or None;
-    collective. Points are ordered by R, then Z; one of two neighbours must slide. Sticking and inseparable contacts are
-    left out."""
+    """Return the tool edge at which its normal turns most between neighbouring contact points, or None; collective.
+
+    Points are ordered by R, then Z; one of two neighbours must slide. Sticking and inseparable contacts are left out.
+    """
     found: list[SharpEdge] = []
     with path.problem.state_context(state) as problem:
         fields = problem.x.array_r.copy()

@@ -87,7 +87,9 @@ class Filling(ColumnTable):
 
 def filling(path: Any, contact: Any) -> Filling:
     """Return the remaining gaps in the corners of a tool, state by state (`Path.filling`); collective.
-    A tool without a corner that the body must fill is an InputError."""
+
+    A tool without a corner that the body must fill is an InputError.
+    """
     from ...contact.tooling import Tooling
     tooling = Tooling.of_problem(path.problem)
     number = path.problem.contacts.index(contact)
@@ -109,7 +111,9 @@ def filling(path: Any, contact: Any) -> Filling:
 
 def corners_of(tool: Tool) -> list[tuple[Corner, np.ndarray]]:
     """Return (`Corner`, points on it (m, 2), length) of the concave fillets and sharp corners of a tool.
-    A fillet has m = 17 points, a sharp corner m = 1. The tool has not moved."""
+
+    A fillet has m = 17 points, a sharp corner m = 1. The tool has not moved.
+    """
     found = []
     pieces = list(tool.pieces)
     for i, piece in enumerate(pieces):

@@ -81,8 +81,10 @@ class Part(PartNumbers):
 def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: float | tuple[str, float] | None = None,
          heights: Sequence[float] = (), units: Units = NONE, planes: MirrorPlanes = NO_PLANES) -> Part:
     """Return the key numbers of a part (`Path.part`).
+
     The density is in g/cm3, trim radius or ("height", h) and heights are lengths, and `planes` are symmetry planes of a
-    modelled half or quarter. A trim or height out of reach is an InputError."""
+    modelled half or quarter. A trim or height out of reach is an InputError.
+    """
     profile, images = wall.profile, planes.factor
     basis = planes.basis(None if axisymmetric else units.length or "unit")
     units = units if axisymmetric else units.per_depth()
@@ -116,8 +118,10 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
 
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
     """Return the fraction, 0 to 1, of each strip of the wall that belongs to the trimmed part, shape (n - 1,).
+
     The cut lies where the middle line passes the trim, radius r or ("height", h), for the last time. A trim out of
-    reach is an InputError."""
+    reach is an InputError.
+    """
     inside = np.ones(len(wall.r) - 1)
     if trim is None:
         return inside
@@ -135,7 +139,9 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
 
 def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
     """Return the volume inside the inner face, length^3; in plane strain per depth.
-    `inside` is the fraction of each strip that belongs to the part, shape (n - 1,)."""
+
+    `inside` is the fraction of each strip that belongs to the part, shape (n - 1,).
+    """
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
         slices = _sums(_up_to(refined(face)[:-1], refined(face)[1:], axisymmetric), len(wall.r)) * inside
@@ -147,8 +153,10 @@ def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
 def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool, start: np.ndarray | None = None,
             end: np.ndarray | None = None) -> np.ndarray:
     """Return the volumes of the m - 1 strips between two lines, length^3; in plane strain per unit depth, length^2.
+
     Lines have points (m, 2), length. The first and last strip extend to lines `start` and `end`, shape (k, 2); None is
-    straight."""
+    straight.
+    """
     corners = [bottom[:-1], bottom[1:], top[1:], top[:-1]]
     total = np.zeros(len(bottom) - 1)
     for a, b in zip(corners, corners[1:] + corners[:1]):

@@ -18,9 +18,11 @@ _KEPT = 2**25  # matrices of the fits are stored for the next state if they have
 
 class Patches:
     """Least-squares fits of cubics to values at quadrature points, for m of the n cells of a mesh.
+
     The cubic of a cell is fitted to the values in its patch: the cells of the same layer that share a corner with it.
     Points (R, Z) have shape (n, q, 2), length, corners of cells (n, 3), their layers (n,), and the cells to be fitted
-    (m,)."""
+    (m,).
+    """
 
     def __init__(self, points: np.ndarray, corners: np.ndarray, layer: np.ndarray, fitted: np.ndarray):
         self._points = points
@@ -51,7 +53,9 @@ class Patches:
 
     def _operator(self, chunk: slice) -> np.ndarray:
         """Return matrices from values at the points of a patch to its cubic, shape (cells of the slice, 10, points).
-        The last columns are 0 for a patch with fewer points than the largest."""
+
+        The last columns are 0 for a patch with fewer points than the largest.
+        """
         if chunk.start in self._operators:
             return self._operators[chunk.start]
         patch = self._patch[chunk]

@@ -29,7 +29,9 @@ class Peeling(NamedTuple):
 
 def strongest(problem: Any, states: Sequence[Any]) -> Peeling | None:
     """Return the tool with the largest ratio of tangential to normal contact forces; collective.
-    None if no sheet sticks to a tool from which it may separate."""
+
+    None if no sheet sticks to a tool from which it may separate.
+    """
     found = []
     for state in states:
         with problem.state_context(state):

@@ -169,7 +169,9 @@ def whole_part(profile: Profile, planes: MirrorPlanes) -> Profile:
 
 def _joined_with_image(profile: Profile, plane: MirrorPlane, near: float) -> Profile:
     """Return a profile joined with its mirror image; unchanged if neither an end nor a face lies in the plane.
-    `near` is the tolerance of positions, length."""
+
+    `near` is the tolerance of positions, length.
+    """
     def image(points: np.ndarray) -> np.ndarray:
         """Return the mirror images of points, shape (n, 2), length."""
         unit = np.eye(2)[plane.axis]
@@ -205,7 +207,9 @@ def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 class Profiles:
     """Computes the `Profile` of a sheet in states of one problem.
-    The mesh has the boundaries `bottom` and `top`, or `inner` and `outer`."""
+
+    The mesh has the boundaries `bottom` and `top`, or `inner` and `outer`.
+    """
 
     def __init__(self, problem: Any):
         self._problem = problem
@@ -221,7 +225,9 @@ class Profiles:
 
     def _make_probe(self) -> Probe:
         """Return the `Probe` of the displacements at the bottom points, the top points, the start and the end.
-        A mesh without a pair of faces, or a sheet in three dimensions, is an InputError."""
+
+        A mesh without a pair of faces, or a sheet in three dimensions, is an InputError.
+        """
         mesh = self._problem.scene.first.mesh
         if self._problem.scene.kinematics.components == 3:
             raise InputError("a sheet in three dimensions has no profile: use path.wall(), its section(), or"
@@ -240,8 +246,10 @@ class Profiles:
 
 def _edge_points(mesh: Any, faces: tuple[str, str], bottom: np.ndarray, top: np.ndarray) -> np.ndarray:
     """Return points at equal distances along the edge of a section from its bottom to its top, shape (17, 2), length.
+
     The edge is the boundary of the mesh, other than the two `faces`, that ends at the two points `bottom` and `top`,
-    shape (2,) each, length. If there is no such boundary, it is the straight line between them."""
+    shape (2,) each, length. If there is no such boundary, it is the straight line between them.
+    """
     line = np.array([bottom, top])
     for name in (name for name in mesh.boundaries if name not in faces):
         try:
@@ -267,8 +275,10 @@ def refined(line: np.ndarray, parts: int = 6) -> np.ndarray:
 
 def _opposite(line: np.ndarray, other: np.ndarray) -> np.ndarray:
     """Return for each node of a face the point at which its normal meets the other face, shape (n, 2), length.
+
     Both faces have nodes end, middle, end, ... in the same direction, (n, 2) and (m, 2). Ends are opposite ends; a
-    normal that misses takes the nearest end."""
+    normal that misses takes the nearest end.
+    """
     a, m, b = line[:-1:2], line[1::2], line[2::2]          # tangents of the parabola through an edge's nodes
     tangent = np.zeros_like(line)
     tangent[1::2] = b - a

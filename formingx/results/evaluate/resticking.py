@@ -35,8 +35,11 @@ class Resticking(NamedTuple):
 
 
 def furthest(path: Any) -> Resticking | None:
-    """Return the contact point that separates and sticks elsewhere, with the largest shift on the last mesh; None;
-    collective. The shift over its tributary length is an upper bound of the wall error by step lengths."""
+    """Return the contact point that separates and sticks elsewhere with the largest shift, or None; collective.
+
+    Only points of the last mesh count. The shift over its tributary length is an upper bound of the wall error by step
+    lengths.
+    """
     found = []
     for number, contact in enumerate(c for c in path.problem.contacts if c.has_history):   # contacts come first
         definition = contact.contact
@@ -55,7 +58,9 @@ def furthest(path: Any) -> Resticking | None:
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
     """Return the summed shifts of the sticking positions over tributary lengths of n owned points, (n,).
-    `touches` has the `ContactHistory` of these points in successive states."""
+
+    `touches` has the `ContactHistory` of these points in successive states.
+    """
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
     for history in touches:
@@ -68,7 +73,9 @@ def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
 
 def findings(item: Resticking | None) -> list[Finding]:
     """Return a note or a warning in a list if a sticking position shifted by 0.003 tributary lengths or more; else [].
-    The numbers of the note are results of benchmarks/steps_in_moulds.py."""
+
+    The numbers of the note are results of benchmarks/steps_in_moulds.py.
+    """
     if item is None or item.shift < WALL_ERROR:
         return []
     count = f"{item.points} points that stuck" if item.points > 1 else "A point that stuck"

@@ -28,7 +28,9 @@ class Polynomial(NamedTuple):
 
 def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomial:
     """Return the polynomial with values a, b at s = 0 and 1, and with slopes `start`, `end` there, if any.
-    It is a cubic with two slopes, a parabola with one, and a straight line without."""
+
+    It is a cubic with two slopes, a parabola with one, and a straight line without.
+    """
     change = b - a
     if start is None and end is None:
         return Polynomial((a, change))
@@ -44,5 +46,6 @@ def integral(f: Polynomial, y: Polynomial) -> float:
 
     .. math:: \int_0^1 \sum_i f_i \, \frac{dy_i}{ds} \, ds
 
-    Values of both polynomials are numbers, or arrays of the same shape."""
+    Values of both polynomials are numbers, or arrays of the same shape.
+    """
     return float(sum(w * np.sum(f.value(s) * y.slope(s)) for s, w in zip(*GAUSS)))

@@ -218,7 +218,9 @@ class Stresses:
 
     def locate(self, points: np.ndarray, layer: str) -> LocatedPoints:
         """Return the cells of a layer that contain reference points (n, 2), length; collective.
-        The last result of each layer is stored. A point outside the layer is an InputError."""
+
+        The last result of each layer is stored. A point outside the layer is an InputError.
+        """
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
             forms, positions = self.problem.forms, self.problem.followed(points)
@@ -237,7 +239,9 @@ class Stresses:
 
     def layer_pressures(self, state: Any) -> np.ndarray:
         """Return the pressure of each layer that is split off before the projection, shape (layers,), stress.
-        It is minus the volume mean of the principal Cauchy stress of least magnitude in a state. Collective."""
+
+        It is minus the volume mean of the principal Cauchy stress of least magnitude in a state. Collective.
+        """
         found = np.zeros((2, len(self.cells)))
         for k, layer in enumerate(self.cells):
             _, values, volume = self._at_quadrature(state, layer)
@@ -298,7 +302,9 @@ class Stresses:
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
         """Return the largest principal Cauchy stress at corners of cells, (m,), and the corners, (m, 2), length.
-        The stresses are those fitted in `fit`, for the m cells of this rank."""
+
+        The stresses are those fitted in `fit`, for the m cells of this rank.
+        """
         owned = own_cells(self.problem.forms.domain)
         X = cell_node_positions(self.problem.forms.domain, owned)[:, :3]
         largest = np.linalg.eigvalsh(self._fitted_cauchy(fitted.cubics, fitted.pressures, X))[..., -1]
@@ -316,8 +322,10 @@ class Stresses:
 
     def _at_quadrature(self, state: Any, layer: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return F, S and volumes at the q quadrature points of each of this rank's m cells of a layer in a state.
+
         Positions have shape (m, q, 2), length; F_rr, F_rz, F_zr, F_zz, F_hoop, S_rr, S_rz, S_zz, S_hoop (m, q, 9);
-        volumes (m, q), length^3 or, in plane strain, length^2."""
+        volumes (m, q), length^3 or, in plane strain, length^2.
+        """
         forms = self.problem.forms
         number = next(i for i, (_, names) in enumerate(forms.bodies) if layer in names)
         if number not in self._raw:
@@ -343,7 +351,9 @@ class Stresses:
 
     def _parts(self, names: list[str]) -> list[tuple[Any, dict]]:
         """Return the terms of the stress S: the material's, then the volume term, for layers of one material.
-        Each is (list of S_rr, S_rz, S_zz, S_hoop in UFL, quadrature metadata of its integral)."""
+
+        Each is (list of S_rr, S_rz, S_zz, S_hoop in UFL, quadrature metadata of its integral).
+        """
         F = ufl.variable(self.problem.forms.F)
         parts = []
         for density, metadata in self.problem.forms.energy_densities(names, F):

@@ -115,6 +115,7 @@ class StressPeak(NamedTuple):
 
 class Fitted(NamedTuple):
     """Computed and fitted Cauchy stress at the q quadrature points of each of the m cells that this rank owns.
+
     The fit is made to the deformation gradient F and the second Piola-Kirchhoff stress S.
 
     Attributes:
@@ -136,8 +137,10 @@ class Fitted(NamedTuple):
 
     def error(self, exact: Callable | None = None) -> StressError:
         """Return the errors of the computed stress in this rank's cells: its differences from a more accurate stress.
+
         The `exact` stress is a function of positions (n, 2) with shape (n, 3, 3); default the fitted one. Another type
-        or shape is an InputError."""
+        or shape is an InputError.
+        """
         better = self.smooth
         if exact is not None:
             if not callable(exact):

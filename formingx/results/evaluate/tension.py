@@ -40,12 +40,14 @@ class Resultant(NamedTuple):
 
 class Tension:
     r"""Computes the principal stress resultants of an incompressible membrane, forces per deformed length.
+
     A layer has the reference thickness h, the meridional stretch l1, the hoop stretch l2, the stretch l3 of its
     thickness, and the energy density W per reference volume. Its resultants N1 and N2 are
 
     .. math:: N_i = h \, l_3 (l_i P_{ii} - l_3 P_{33}), \qquad P = \partial W / \partial F
 
-    The resultants of all layers are added. The problem has a scene whose model is a `Membrane`."""
+    The resultants of all layers are added. The problem has a scene whose model is a `Membrane`.
+    """
 
     def __init__(self, problem: Any):
         forms, self._problem = problem.forms, problem
@@ -62,7 +64,9 @@ class Tension:
 
     def smallest(self, state: Any) -> Resultant:
         """Return the smallest meridional or hoop resultant at the quadrature points in a state; collective.
-        Compression is negative. In plane strain the resultants out of plane are not examined."""
+
+        Compression is negative. In plane strain the resultants out of plane are not examined.
+        """
         values = self._values(state)
         n = 2 if self._problem.scene.kinematics.axisymmetric else 1
         k, i = np.unravel_index(np.argmin(values[:, :n]), (len(values), n))
@@ -76,8 +80,10 @@ class Tension:
 
     def _values(self, state: Any) -> np.ndarray:
         """Return data at the n quadrature points of all ranks in a state, shape (n, 5); collective.
+
         The columns are the meridional and the hoop resultant over shear modulus times thickness, R and Z (length), and
-        the hoop force per reference length of the meridian (stress * length)."""
+        the hoop force per reference length of the meridian (stress * length).
+        """
         problem, domain = self._problem, self._problem.forms.domain
         with problem.state_context(state):
             cells = own_cells(domain)
@@ -87,7 +93,9 @@ class Tension:
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:
     """Return the number of the first state in which a membrane in a section is compressed, and its resultant.
-    The smallest resultant is meant; None without compression or without a membrane. Collective."""
+
+    The smallest resultant is meant; None without compression or without a membrane. Collective.
+    """
     k = 0
     for segment in path.record.segments:
         scene = segment.problem.scene

@@ -19,7 +19,9 @@ _MAX_VOLUME_RATIO = 2.0
 
 def findings(error: float, where: str, far_error: float | None = None) -> list[Finding]:
     """Return a finding in a list if the root mean square of J - 1 exceeds 0.005 in a state; else an empty list.
-    Above 0.02 it is a warning, unless `far_error`, away from clamped faces, is small; `where` names the state."""
+
+    Above 0.02 it is a warning, unless `far_error`, away from clamped faces, is small; `where` names the state.
+    """
     if error <= NOTICEABLE:
         return []
     if far_error is not None and far_error <= 4 * NOTICEABLE:
@@ -48,9 +50,11 @@ def _clamped(path: Any) -> tuple[np.ndarray, float]:
 
 
 def extreme_ratio(path: Any) -> list[Finding]:
-    """Return a finding in a list if J is not between 1/2 and 2 somewhere in the last state; else an empty list;
-    collective. J is examined at quadrature points, also of the next higher degree, and at middles of edges. J <= 0 away
-    from clamps is a warning."""
+    """Return a finding in a list if J is not between 1/2 and 2 somewhere in the last state; collective.
+
+    J is examined at quadrature points, also of the next higher degree, and at middles of edges. J <= 0 away from clamps
+    is a warning.
+    """
     furthest = path.problem.extreme_volume_ratio(path.last)
     J = 1.0 if furthest is None else furthest.value
     if 1 / _MAX_VOLUME_RATIO < J < _MAX_VOLUME_RATIO:

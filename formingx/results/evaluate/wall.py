@@ -111,7 +111,9 @@ class Walls:
 
     def evaluate(self, state: Any) -> Wall:
         """Return the wall in a state; collective.
-        A body that is no sheet, or whose layers do not lie above each other, is an InputError."""
+
+        A body that is no sheet, or whose layers do not lie above each other, is an InputError.
+        """
         path, profile = self._path, self._path.profile(state)
         names = list(path.problem.scene.mesh.layers)
         shares = {names[0]: np.ones(len(profile.bottom))}
@@ -130,8 +132,10 @@ class Walls:
 
 def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
     """Return the k + 1 layers from the bottom up, and the points between them on n lines across, (k, n, 2), length.
+
     Reference lines go from the bottom points of the profile to the opposite top points. Layers that do not lie above
-    each other are an InputError."""
+    each other are an InputError.
+    """
     if len(mesh.layers) == 1:
         return list(mesh.layers), np.zeros((0, *profile.reference_bottom.shape))
     edges = _interfaces(mesh)
@@ -152,7 +156,9 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
     """Return the straight pieces of the interfaces between two named layers, equal on all ranks; collective.
-    The reference positions of both ends have shape (m, 2, 2), length."""
+
+    The reference positions of both ends have shape (m, 2, 2), length.
+    """
     domain, topology = mesh.domain, mesh.domain.topology
     topology.create_connectivity(1, 2)
     layer = np.full(len(_compat.cell_nodes(domain)), -1)
@@ -175,7 +181,9 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
 
 def _crossing(start: np.ndarray, direction: np.ndarray, pieces: np.ndarray) -> np.ndarray:
     """Return s at which lines start + s direction, (n, 2) each, first meet pieces (m, 2, 2), shape (n,).
-    A line that meets no piece within 0 <= s <= 1 has nan."""
+
+    A line that meets no piece within 0 <= s <= 1 has nan.
+    """
     a, edge = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
     from_start = a - start[:, None]
     det = direction[:, None, 0] * edge[:, 1] - direction[:, None, 1] * edge[:, 0]

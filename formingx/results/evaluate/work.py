@@ -69,8 +69,10 @@ class EnergyBalance:
 
     def rows(self) -> dict[str, np.ndarray]:
         """Return {entry: energy added from the previous state, shape (states,)}, stress length^3; collective.
+
         Loads, supports and tools have their work on the body. "friction", "jumps" and "bonds" are positive losses,
-        "heat" and "change" energies by temperature and stage."""
+        "heat" and "change" energies by temperature and stage.
+        """
         pairs = list(zip(self._states, self._states[1:]))
         found = [self._step_energies(a, b) for a, b in pairs]
         scale = max((abs(s.measures["strain_energy"]) for s in self._states), default=0.0)
@@ -84,8 +86,10 @@ class EnergyBalance:
     def _refined(self, a: Any, b: Any, estimate: dict[str, float], small: float,
                 times: int = _MAX_HALVINGS) -> dict[str, float]:
         """Return {entry: energy added} of a step from a to b, with further states between; collective.
+
         Halving ends below the change `small` of energy, or after `times`; without a state in between `estimate`
-        remains."""
+        remains.
+        """
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
             return estimate
@@ -97,7 +101,9 @@ class EnergyBalance:
 
     def _middle(self, a: Any, b: Any) -> Any:
         """Return a state near half the arc length from state a to state b, or None if none is found; collective.
-        It is solved for with the history variables of a, and has its own, updated ones."""
+
+        It is solved for with the history variables of a, and has its own, updated ones.
+        """
         problem, curve, h = self._problem, self._curve, self._curve.distance(a, b)
         if not h:
             return None
@@ -132,7 +138,9 @@ class EnergyBalance:
 
     def _body_energies(self, a: Any, b: Any) -> dict[str, float]:
         """Return {load, tool, loss or other entry: energy added to the modelled body from state a to state b}.
-        The energy lost in a snap-through is not included."""
+
+        The energy lost in a snap-through is not included.
+        """
         found: dict[str, float] = {}
         if b.kind != "jump" and any(c.law.has_friction for c in self._problem.contacts):
             found["friction"] = self._friction(a, b)
@@ -164,7 +172,9 @@ class EnergyBalance:
 
     def _load_work(self, a: Any, x: Polynomial, control: Polynomial) -> dict[str, float]:
         """Return {load: work in a step}, and as "change" the work of fading forces that a new stage left unbalanced.
-        Unknowns and control are polynomials from 0 to 1 in the step."""
+
+        Unknowns and control are polynomials from 0 to 1 in the step.
+        """
         problem = self._problem
         names = [name for name, _ in self._loads]
         found = dict.fromkeys(names, 0.0)
@@ -220,7 +230,9 @@ class EnergyBalance:
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
         """Return the owned displacement unknowns at the n nodes of a contact face, shape (n, 2).
-        If several contacts share the face, only nodes that touch this tool are returned."""
+
+        If several contacts share the face, only nodes that touch this tool are returned.
+        """
         problem, dofs = self._problem, contact.rule.dofs
         if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
             return dofs[contact.touching(fields, control)]
@@ -236,8 +248,10 @@ class EnergyBalance:
 
     def _friction(self, a: Any, b: Any) -> float:
         """Return the energy that friction on the modelled body dissipates from state a to state b, stress length^3.
+
         It is the sum over all contact points of area times mean tangential traction times increment of inelastic
-        slip."""
+        slip.
+        """
         problem, lost, before = self._problem, 0.0, {}
         contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]
         if a.setting != b.setting or not contacts:
@@ -253,7 +267,9 @@ class EnergyBalance:
 
     def _heat(self, a: Any, b: Any) -> float:
         """Return the energy that the change of temperature from state a to state b stores in the modelled body.
-        It is the mean of two changes at constant displacements, in the configurations of a and b."""
+
+        It is the mean of two changes at constant displacements, in the configurations of a and b.
+        """
         cold, warm = a.history_variables[-1], b.history_variables[-1]        # the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:
@@ -295,7 +311,9 @@ def _friction_of(contact: Any, state: Any, problem: Any) -> np.ndarray:
 
 def _slip_of(law: Any, x: np.ndarray, history: Any, end: np.ndarray) -> np.ndarray:
     """Return the elastic slip of n contact points at the start of a step, plus the slip in it, (n,), length.
-    Points move from x to `end`, (n, 2), relative to the tool, on straight lines; only the part in contact counts."""
+
+    Points move from x to `end`, (n, 2), relative to the tool, on straight lines; only the part in contact counts.
+    """
     nearest, outer_edge = law.nearest(end), -law.theta
     touched, touches = history.distance > outer_edge, nearest.distance > outer_edge
     approach = nearest.distance - history.distance
@@ -343,8 +361,10 @@ def findings(balanced: dict[str, np.ndarray]) -> list[Finding]:
 
 def balance(path: Any) -> dict[str, np.ndarray]:
     """Return {load, tool, support, "strain_energy", loss or "unbalanced": energy up to each state}; collective.
+
     Energies have shape (states,), stress length^3, in plane strain length^2. K-BKZ materials, whose energy is no
-    function of the state, raise an InputError."""
+    function of the state, raise an InputError.
+    """
     if "strain_energy" not in path.columns:
         raise InputError("Path.work: is not available with K-BKZ: its stored energy is no function of its state")
     balances = [getattr(segment.problem.forms, "energy_balance", EnergyBalance)(segment).rows()

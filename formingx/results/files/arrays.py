@@ -9,7 +9,9 @@ _KEY, _TYPES = "array", ("<f8", "<i8", "|b1")
 
 def pack(data: Any) -> tuple[Any, bytes]:
     """Split data into JSON data and the bytes of its arrays; `unpack` is the inverse.
-    An array becomes {"array": [position of its first byte, type, shape]}; the bytes are little-endian and in order."""
+
+    An array becomes {"array": [position of its first byte, type, shape]}; the bytes are little-endian and in order.
+    """
     found: list[bytes] = []
     end = 0
 
@@ -30,7 +32,9 @@ def pack(data: Any) -> tuple[Any, bytes]:
 
 def unpack(data: Any, content: bytes) -> Any:
     """Return the data that `pack` split; its arrays are read-only.
-    An array of unknown type, or outside `content`, raises a ValueError."""
+
+    An array of unknown type, or outside `content`, raises a ValueError.
+    """
     if isinstance(data, list):
         return [unpack(value, content) for value in data]
     if not isinstance(data, dict):

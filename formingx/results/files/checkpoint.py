@@ -58,7 +58,9 @@ from .progress import progress
 
 class Checkpoint:
     """Writer of the checkpoint folder of one run, a `pathlib.Path`; creating it is collective.
-    A folder of another run, or with other files, is an InputError; one that cannot be written an OSError."""
+
+    A folder of another run, or with other files, is an InputError; one that cannot be written an OSError.
+    """
 
     def __init__(self, folder: Any, path: Any):
         self.folder, self._path, self._comm = file_path("checkpoint", folder), path, path.problem.comm
@@ -66,7 +68,9 @@ class Checkpoint:
 
     def write(self) -> None:
         """Write the states of the path that the folder does not contain yet; collective.
-        An OSError, as of a full disk, keeps all earlier states."""
+
+        An OSError, as of a full disk, keeps all earlier states.
+        """
         path, first = self._path, self._n_written
         with progress(self._comm, f"{self.folder}: {len(path) - first} states") as done:
             for number in range(first, len(path)):
@@ -83,8 +87,10 @@ class Checkpoint:
 
     def _begin(self) -> int:
         """Create the folder, or check that its states belong to this run, and return their number; collective.
+
         States of an unfinished last step are removed. Another run or other files are an InputError, failed writing an
-        OSError."""
+        OSError.
+        """
         problem, folder, path = self._path.record.segments[0].problem, self.folder, self._path
         scene = describe(problem)
         about = {"formingx": FORMAT, "versions": files.versions(), "scene": scene, "summary": summary(problem.scene)}
@@ -156,8 +162,10 @@ class Checkpoint:
 
 def read(folder: Any, scene: Scene, state: int | None = None, resumes: bool = False) -> Record:
     """Return the solver's record of the run in a checkpoint up to a state (`formingx.load`); collective.
+
     Default is the last state of the last completed step. A damaged checkpoint, another scene or state is an InputError,
-    with `resumes` also an object that cannot be compared."""
+    with `resumes` also an object that cannot be compared.
+    """
     folder = file_path("load: folder", folder)
     problem = Problem(check_type("load: scene", scene, Scene, "a formingx.Scene"))
     about = describe(problem)
@@ -227,7 +235,9 @@ def _read_state(data: dict, problem: Any) -> State:
 
 def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
     """Return the unknowns of each cell on rank 0 in the order of the script, from owned ones; collective.
-    The shape is (cells, unknowns per cell), and empty on other ranks."""
+
+    The shape is (cells, unknowns per cell), and empty on other ranks.
+    """
     topology, w = space.mesh.topology, fem.Function(space)
     cells, n = topology.index_map(topology.dim).size_local, space.dofmap.index_map.size_local
     w.x.array[:n] = owned[:n]
@@ -269,7 +279,9 @@ def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> li
 
 def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:
     """Return the `Profile` of a state as {attribute: its value}, or None if the body is not a sheet.
-    Reports that are made from a checkpoint, without the `Scene`, draw it."""
+
+    Reports that are made from a checkpoint, without the `Scene`, draw it.
+    """
     try:
         profile = path.profile(state)
     except InputError:

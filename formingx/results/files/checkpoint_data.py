@@ -38,7 +38,9 @@ def begun(folder: Any) -> bool:
 
 def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
     """Return count of states, attributes of the last `count` states, and seconds since the last was written.
-    A run may still be writing. A missing, empty or damaged checkpoint is an InputError."""
+
+    A run may still be writing. A missing, empty or damaged checkpoint is an InputError.
+    """
     folder = file_path("checkpoint", folder)
     _check_format(folder, read_json(folder / "scene.json"))
     n = len(complete_states(folder))
@@ -50,7 +52,9 @@ def latest(folder: Any, count: int) -> tuple[int, list[dict[str, Any]], float]:
 
 def ended(folder: Any) -> dict[str, Any] | None:
     """Return {"failure": message or "", "findings": [Finding]} at the end of a run; None if it has not ended.
-    Older checkpoints without the file give None, too; a damaged file is an InputError."""
+
+    Older checkpoints without the file give None, too; a damaged file is an InputError.
+    """
     file = file_path("checkpoint", folder) / END
     if not file.exists():
         return None
@@ -64,7 +68,9 @@ def ended(folder: Any) -> dict[str, Any] | None:
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     """Return scene.json, with "ended" from `ended`, and the attributes of each state, for a report without the scene.
-    A missing, empty or damaged checkpoint is an InputError."""
+
+    A missing, empty or damaged checkpoint is an InputError.
+    """
     folder = file_path("checkpoint", folder)
     about = read_json(folder / "scene.json")
     _check_format(folder, about)
@@ -136,8 +142,10 @@ def complete_states(folder: FilePath) -> list[FilePath]:
 
 def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     """Return the data of a state of a checkpoint as {name: value}, with its arrays.
+
     They are the attributes of the `State`, history variables as "memory", "profile", "number" and "checksums". A
-    missing or changed file is an InputError."""
+    missing or changed file is an InputError.
+    """
     state_folder = folder / state_name(number)
     data = read_json(state_folder / "state.json")
     try:

@@ -36,8 +36,10 @@ def write_stages(folder: FilePath, plans: Sequence[Any], comm: Any) -> None:
 
 def check_stages(folder: FilePath, plans: Sequence[Any], number: int, now: float, comm: Any) -> None:
     """Check that a process has the stages by which the states of a checkpoint were made; collective.
+
     Stage `number`, at process time `now`, may continue to another end. Unknown stages, or the first difference, are an
-    InputError."""
+    InputError.
+    """
     def check():
         if not (folder / STAGES).exists():
             raise InputError(f"checkpoint {str(folder)!r} has no {STAGES}, by which its stages are compared: it is not"

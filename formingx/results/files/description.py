@@ -21,8 +21,10 @@ _PARTS = ("materials", "supports", "loads", "contacts", "model", "kinematics", "
 
 def describe(problem: Any) -> dict[str, Any]:
     """Return the description of the scene as JSON data, the same on any number of ranks; collective.
+
     The entry "mesh" holds counts and sums that change with any coordinate, tag or order of cells. The others are public
-    attributes of materials, supports, loads, contacts, model and kinematics."""
+    attributes of materials, supports, loads, contacts, model and kinematics.
+    """
     scene = problem.scene
     known = set(_PARTS) | {"mesh", "temperature", "state_transfer"}
     extra = sorted(name for name in vars(scene) if name not in known and not name.startswith("_"))
@@ -44,8 +46,10 @@ def describe(problem: Any) -> dict[str, Any]:
 
 def plain(value: Any, depth: int = 8) -> Any:
     """Return an object as JSON data: numbers, strings, lists and dictionaries of at most `depth` levels.
+
     An object becomes {"kind": its class, public attribute: value}, with the code of a user's class; functions are
-    described by what they compute."""
+    described by what they compute.
+    """
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, np.generic | np.ndarray):
@@ -83,8 +87,10 @@ def incomparable(about: Any, where: str = "") -> Iterator[tuple[str, str]]:
 
 def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Yield the differences between two values of JSON data as (place, value in a, value in b).
+
     A value in one only is None in the other; floats that agree to nine digits are equal. `where` is the place of
-    both."""
+    both.
+    """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in dict.fromkeys([*a, *b]):
             yield from differences(a.get(key), b.get(key), f"{where}.{key}" if where else key)
@@ -109,7 +115,9 @@ def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
 
 def _mesh(problem: Any) -> dict[str, Any]:
     """Return numbers by which a checkpoint recognises the mesh of a problem; collective.
-    They are counts of cells and facets, the extent, and weighted sums of the coordinates of the cells."""
+
+    They are counts of cells and facets, the extent, and weighted sums of the coordinates of the cells.
+    """
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = len(owned := own_cells(domain))
     x = cell_node_positions(domain, owned) / problem.forms.length

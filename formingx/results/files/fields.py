@@ -44,6 +44,7 @@ _NODES = {1: np.array([[0.0], [1.0], [0.5]]), 2: np.array([[0, 0], [1, 0], [0, 1
 
 class Fields:
     """Computes fields such as displacement and stress, at the nodes of the cells that this rank owns.
+
     Each cell has six nodes of its own: its corners, and the middles of its edges. A membrane in a section has three.
 
     Attributes:
@@ -111,7 +112,9 @@ class Fields:
 
     def _contact_pressure(self, state: Any) -> np.ndarray:
         """Return the contact pressure at the nodes of each cell in a state, shape (cells, nodes), stress.
-        It is 0 away from tools. Collective."""
+
+        It is 0 away from tools. Collective.
+        """
         pressure = np.zeros(self.points.shape[:2])
         for k, contact in enumerate(self._problem.contacts):
             if k not in self._faces:
@@ -125,8 +128,10 @@ class Fields:
 
 def to_vtk(path: Any, file: Any, states: Any = None) -> None:
     """Write fields of states as VTU files, NAME-3.vtu for state 3, and a PVD file (`Path.to_vtk`).
+
     States are a state, a sequence, or "all"; default the last. Another ending or type is an InputError, a failed file
-    an OSError."""
+    an OSError.
+    """
     file, comm = files.named("to_vtk", file, ".pvd"), path.problem.comm
     meshes: dict[int, tuple[Fields, Any]] = {}              # fields, and points of all ranks
     steps = []
@@ -174,8 +179,10 @@ def _three(array: np.ndarray) -> np.ndarray:
 
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
     """Return (number, state) of the states to be written: one, a sequence, "all", or None for the last.
+
     The number is that in the path, for one from `Path.state_at` its position; if they do not increase, they count from
-    0. A wrong entry is an InputError."""
+    0. A wrong entry is an InputError.
+    """
     if isinstance(states, str):
         if states != "all":
             raise InputError(f"states = {states!r}: must be states of the path, or 'all'")
@@ -198,7 +205,9 @@ def _gather(values: np.ndarray, comm: Any) -> Any:
 
 def _position_across(points: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return k, (m,), of the line before each point on a sheet, and its position from line k (0) to k + 1 (1).
-    Lines go from bottom points to opposite top points, (n, 2) each, in order; points have shape (m, 2), length."""
+
+    Lines go from bottom points to opposite top points, (n, 2) each, in order; points have shape (m, 2), length.
+    """
     k, part = np.zeros(len(points), dtype=int), np.zeros(len(points))
     across = top - bottom
     for i, x in enumerate(points):

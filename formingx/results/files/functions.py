@@ -37,7 +37,9 @@ _LIBRARIES = tuple(os.path.abspath(folder) + os.sep for folder in (
 
 def described(value: Any, depth: int = 8, known: tuple[int, ...] = ()) -> Any:
     """Return a value that a function uses as JSON data, or {`UNKNOWN`: text} if it cannot be known.
-    `known` has identities of the functions that are being described, which may call themselves."""
+
+    `known` has identities of the functions that are being described, which may call themselves.
+    """
     if value is None or isinstance(value, bool | int | float | str):
         return value
     if isinstance(value, complex | bytes | range | slice):
@@ -77,8 +79,10 @@ def described(value: Any, depth: int = 8, known: tuple[int, ...] = ()) -> Any:
 
 def functions_in(value: Any, where: str = "", known: set[int] | None = None) -> Iterator[tuple[str, Any]]:
     """Yield the functions and tables that an object of formingx holds, as (place, description).
+
     Attributes, variables of functions, and entries of lists and dictionaries are searched, but not the `known`
-    objects."""
+    objects.
+    """
     known = set() if known is None else known
     if id(value) in known or value is None or isinstance(value, type | str | bool | int | float | np.ndarray):
         return
@@ -219,7 +223,9 @@ def _class_code(cls: type, inner: Callable[[Any], Any]) -> dict[str, Any]:
 
 def field_sums(field: Any) -> list[float]:
     """Return two sums over the values of a DOLFINx function, the same on any number of ranks; collective.
-    The weights of the second sum depend on the position, so another value at any point changes it."""
+
+    The weights of the second sum depend on the position, so another value at any point changes it.
+    """
     space = field.function_space
     points = space.tabulate_dof_coordinates()
     comm = original(space.mesh.comm)

@@ -13,8 +13,10 @@ from . import tabular
 
 def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return nodes, wall and quadratic shell elements of the middle surface of an axisymmetric sheet.
+
     `parts` elements lie round the axis. Nodes (n, 3), length; walls (n,), length, means of the shortest distances
-    between the faces; node numbers of triangles S6 (m, 6) and quadrilaterals S8R (k, 8), corners first."""
+    between the faces; node numbers of triangles S6 (m, 6) and quadrilaterals S8R (k, 8), corners first.
+    """
     wall = (distance_to_line(profile.bottom, refined(profile.top))
             + distance_to_line(profile.top, refined(profile.bottom))) / 2
     line = profile.middle
@@ -39,8 +41,10 @@ def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
     """Write an axisymmetric sheet as shell elements for CalculiX or Abaqus (`Path.to_inp`; rank 0 writes).
+
     The file holds nodes, elements, wall thickness, and the set of nodes at the rim. Another ending than .inp is an
-    InputError, a failed file an OSError."""
+    InputError, a failed file an OSError.
+    """
     file = tabular.named("to_inp", file, ".inp")
     points, walls, tips, quads = shells(profile, parts)
     lines = ["*HEADING", "formingx: middle surface of a formed part, turned about z; its walls as thickness",

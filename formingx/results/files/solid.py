@@ -18,7 +18,9 @@ _EDGE_PIECES = 4  # number of straight pieces that replace the curved edge of an
 
 def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarray, np.ndarray]:
     """Return points (n, 3), length, and triangles (m, 3), seen from outside, of the surface of a sheet.
-    It is revolved about z in `parts` strips, or in plane strain extruded along y over the width of the section."""
+
+    It is revolved about z in `parts` strips, or in plane strain extruded along y over the width of the section.
+    """
     line = _section(profile)[0]
     n = len(line)
     on_axis = np.abs(line[:, 0]) < 1e-9 * np.ptp(line)
@@ -46,7 +48,9 @@ def solid(profile: Any, axisymmetric: bool, parts: int = 120) -> tuple[np.ndarra
 
 def _section(profile: Any) -> tuple[np.ndarray, np.ndarray]:
     """Return points (2 k, 2) round a section, and the positions of its first half, (k,), along the nodes.
-    It runs along half of the start, the bottom and half of the end, and back along the upper half."""
+
+    It runs along half of the start, the bottom and half of the end, and back along the upper half.
+    """
     bottom, top = (refined(face, _EDGE_PIECES) for face in (profile.bottom, profile.top))
     (below, above), (under, over) = (
         (edge[1:len(edge) // 2], edge[-2:len(edge) // 2:-1]) if edge is not None else (bottom[:0], bottom[:0])
@@ -73,8 +77,10 @@ def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: 
 
 def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any, units: Units = NONE) -> None:
     """Write the surface of a part as a binary glTF file, coloured by the wall ratio (rank 0 writes).
+
     It is (points (n, 3), triangles (m, 3), ratios (n,)) in `units`; the file is in metres. Another ending than .glb is
-    an InputError, a failed file an OSError."""
+    an InputError, a failed file an OSError.
+    """
     from matplotlib import colormaps
     file = tabular.named("to_gltf", file, ".glb")
     points, triangles, ratio = surface

@@ -118,8 +118,10 @@ def of_folder(folder: Any) -> Status:
 
 def target_column(stepping: dict[str, Any], measures: Collection[str]) -> tuple[str, float] | None:
     """Return (column, value) of the target of a run or stage from its `State.stepping`; None without a target.
+
     A target such as `pressure(0.2)` of one of several loads becomes its column, such as "air_pressure". Without a
-    suitable column, the name is that of the target."""
+    suitable column, the name is that of the target.
+    """
     if "until" not in stepping:
         return None
     name, goal = stepping["until"]
@@ -138,8 +140,10 @@ def _words(seconds: float) -> str:
 
 def watch(folder: Any, every: float = 5.0, patience: float = 600.0) -> Iterator[Status]:
     """Yield the status of a run now and after each new state, until the run ends.
+
     It is read every `every` s, until `patience` s pass without a state (0: once). A damaged or other folder is an
-    InputError."""
+    InputError.
+    """
     every, patience = positive("watch: every", every), non_negative("watch: patience", patience)
     seen, since = -1, time.monotonic()
     while True:

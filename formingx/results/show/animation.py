@@ -22,7 +22,9 @@ from .report_data import progress
 
 def between(record: Any, a: Any, b: Any, fraction: float) -> Any:
     """Return the state at a fraction from a state to the next, on the cubic through both; it is not in equilibrium.
-    If `b` begins another stage, it is `b`."""
+
+    If `b` begins another stage, it is `b`.
+    """
     if a.setting != b.setting:
         return b
     x, control = record.segment(b).curve.interpolate(a, b, fraction)
@@ -31,8 +33,10 @@ def between(record: Any, a: Any, b: Any, fraction: float) -> Any:
 
 def animate(path: Any, file: Any, frames: int, seconds: float, units: Units = NONE) -> None:
     """Draw the animation of a path to a .gif or .mp4 file (`Path.animate`).
+
     `seconds` is the duration, with one more for the last frame. Another ending, missing ffmpeg, no sheet or a single
-    state is an InputError, a failed file an OSError."""
+    state is an InputError, a failed file an OSError.
+    """
     file = files.named("animate", file, ".gif", ".mp4")
     if file.suffix.lower() == ".mp4" and _ffmpeg() is None:
         raise InputError(f"animate: file {str(file)!r}: an MP4 needs the program ffmpeg, which is not there; a .gif"
@@ -87,7 +91,9 @@ def has_image_at_axis(scene: Any) -> bool:
 
 def spread(path: Any, frames: int, sheet: bool = True) -> list[tuple[Any, Any, float]]:
     """Return (state, next state, position 0 to 1) of frames evenly spaced over the progress of the process.
-    sheet: True for a sheet in a section, whose motion counts in a run without time."""
+
+    sheet: True for a sheet in a section, whose motion counts in a run without time.
+    """
     profiles = [path.profile(state) if sheet else None for state in path.states]
     done = progress({c: path[c] for c in path.columns}, profiles)
     found = []
@@ -100,8 +106,10 @@ def spread(path: Any, frames: int, sheet: bool = True) -> list[tuple[Any, Any, f
 
 def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
     """Return {stage: (column x, column y)} of the loading curves.
+
     Constant pressures and travels are left out. If all are constant, a force over the process time is drawn, or the
-    pole height."""
+    pole height.
+    """
     found = {}
     for stage in dict.fromkeys(state.stage for state in path.states):
         values = {c: [s.measures[c] for s in path.states if s.stage == stage] for c in path.columns}
@@ -118,8 +126,10 @@ def columns_of_stages(path: Any) -> dict[str, tuple[str, str]]:
 
 def _draw(shapes: list, tools: list, now: list, curves: dict, both_sides: bool, units: Units) -> list[Any]:
     """Return the frames of the animation as images; `both_sides` draws the mirror image at r = 0, too.
+
     `tools` has (tool, displacement (2,)) of active tools and `now` ((x, y) columns, their values) in each frame;
-    `curves` maps (x, y) to values (m,) each."""
+    `curves` maps (x, y) to values (m,) each.
+    """
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -177,7 +187,9 @@ def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
 
 def _save_mp4(pictures: list[Any], seconds: float, stream: Any) -> None:
     """Write images as an MP4 with H.264, which every player reads; the last one is shown for one second more.
-    The stream is closed. A failure of ffmpeg raises an OSError."""
+
+    The stream is closed. A failure of ffmpeg raises an OSError.
+    """
     width, height = (2 * (n // 2) for n in pictures[0].size)              # H.264 wants even numbers
     rate = len(pictures) / seconds
     stream.close()                                           # ffmpeg writes the file by its name

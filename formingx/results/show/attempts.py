@@ -11,15 +11,19 @@ log = logging.getLogger("formingx")
 
 class Attempts:
     """Parts of a report that were tried, and findings: a warning for each part that failed.
-    Errors of the classes `refusals` are raised, because they refuse an argument of the user."""
+
+    Errors of the classes `refusals` are raised, because they refuse an argument of the user.
+    """
 
     def __init__(self, *refusals: type[Exception]):
         self._refusals = refusals
         self.findings: list[Finding] = []
 
     def make(self, name: str, draw: Callable[[], Any], fallback: Any) -> Any:
-        """Return the result of `draw`, or a fallback if it fails; the error becomes a finding on `name`, such as "the
-        picture"."""
+        """Return the result of `draw`, or a fallback if it fails.
+
+        The error becomes a finding on `name`, such as "the picture".
+        """
         try:
             return draw()
         except self._refusals:

@@ -45,7 +45,9 @@ def packed(text: str) -> str:
 def data(records: list[ReportData], names: list[str], units: Units, attempts: Attempts,
          extra: dict[str, Any] | None = None, charts: Sequence[dict[str, Any]] = ()) -> str:
     """Return all data that `report.js` draws, as JSON text.
-    `extra` has further entries of each run, `charts` are drawn before the others. Drawings that fail are left out."""
+
+    `extra` has further entries of each run, `charts` are drawn before the others. Drawings that fail are left out.
+    """
     runs = [_run(record, name, units, attempts) | (extra or {}) for record, name in zip(records, names)]
     kinds: list[tuple[str, Callable[[], list]]] = [
         ("the curves of forces and pressures", lambda: _loading(records, names, units)),
@@ -67,7 +69,9 @@ def _finite_of(draw: Callable[[], Any]) -> Any:
 
 def _run(record: ReportData, name: str, units: Units, attempts: Attempts) -> dict[str, Any]:
     """Return the data of one run for `report.js` as a dictionary.
-    It holds the stages, and for each drawn state the main columns, the tools and the sheet."""
+
+    It holds the stages, and for each drawn state the main columns, the tools and the sheet.
+    """
     progress, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(progress[a]), "to": float(progress[b - 1])}
               for a, b in record.stage_ranges]
@@ -85,8 +89,10 @@ def _run(record: ReportData, name: str, units: Units, attempts: Attempts) -> dic
 
 def _sheet(record: ReportData, units: Units) -> dict[str, Any]:
     """Return the data of a sheet for `report.js`, at no more than 101 stations along it and in the drawn states.
+
     With m stations: "from" (R or Z), "material" (m,); "bottom", "top" (states, 2, m), "start", "end" (states, 2, k),
-    "weights" (2, m); "fields" {label: (states, m)}."""
+    "weights" (2, m); "fields" {label: (states, m)}.
+    """
     n = len(record.profiles[-1].bottom)
     stations = np.unique(np.linspace(0, n - 1, min(n, FRAMES + 1)).round().astype(int))
     fields: dict[str, list] = {}
@@ -120,8 +126,10 @@ def _label(record: ReportData, units: Units, key: str) -> str:
 
 def _tools(record: ReportData) -> list[dict[str, Any]]:
     """Return the data of each tool of a section for `report.js`.
+
     "line" and, moved inwards, "shell" have shape (2, n); "moves" is the displacement (r, z) per travel, "travel" that
-    of each state, None while inactive."""
+    of each state, None while inactive.
+    """
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)
     found, frames = [], record.frames
@@ -139,7 +147,9 @@ def _tools(record: ReportData) -> list[dict[str, Any]]:
 
 def _loading(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any]]:
     """Return plotly charts of loading curves: force of a tool over travel, or pressure over pole height.
-    A chart has one curve for each stage of each run. `names` has the name of each run, for the legend."""
+
+    A chart has one curve for each stage of each run. `names` has the name of each run, for the legend.
+    """
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
         for a, b in record.stage_ranges:
@@ -154,7 +164,9 @@ def _loading(records: list[ReportData], names: list[str], units: Units) -> list[
 
 def _driven(record: ReportData, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
     """Return a loading curve for each travel and each pressure that changes in a stage.
-    It has the names of x and y, and their values in the n states, (n,) each."""
+
+    It has the names of x and y, and their values in the n states, (n,) each.
+    """
     found, measures = [], record.measures
     for column, values in measures.items():
         if np.ptp(values[stage]) <= 1e-9 * (np.ptp(values) or 1.0):
@@ -176,7 +188,9 @@ def _driven(record: ReportData, stage: slice) -> list[tuple[str, str, np.ndarray
 
 def _in_time(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
     """Return plotly charts of pressures, travels, tool forces and temperatures of the body over the process time.
-    Runs without process time have no curves. `names` has the name of each run, for the legend."""
+
+    Runs without process time have no curves. `names` has the name of each run, for the legend.
+    """
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
         if not record.timed:
@@ -207,8 +221,10 @@ def _trace(x: np.ndarray, y: np.ndarray, name: str) -> dict[str, Any]:
 
 def _filling(records: list[ReportData], names: list[str], units: Units) -> dict[str, Any] | None:
     """Return a plotly chart of the remaining gap in each corner of the fixed tools, or None without corners.
+
     The gaps are drawn over the process time if all runs have one, or else over the pressure in the last stage. `names`
-    has the name of each run, for the legend."""
+    has the name of each run, for the legend.
+    """
     traces, timed = [], all(record.timed for record in records)
     for record, name in zip(records, names):
         abscissa = record.measures["process_time"] if timed else next(
@@ -224,8 +240,10 @@ def _filling(records: list[ReportData], names: list[str], units: Units) -> dict[
 
 def _walls(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
     """Return two plotly charts of the wall thickness in the last state: over the height, and over the arc length.
+
     Both show the whole wall and, if there are several, each layer. A chart is None if no run has a profile. `names` has
-    the name of each run, for the legend."""
+    the name of each run, for the legend.
+    """
     from ..evaluate.wall import Wall
     by_height, by_length = [], []
     for record, name in zip(records, names):
@@ -247,7 +265,9 @@ def _walls(records: list[ReportData], names: list[str], units: Units) -> list[di
 
 def chart(title: str, x: str, y: str, traces: list[dict], zero: str = "", equal: bool = False) -> dict[str, Any] | None:
     """Return a chart as data for `report.js`; None without curves.
-    "x" or "y" in `zero` makes that axis begin at 0; with `equal` both axes have the same scale."""
+
+    "x" or "y" in `zero` makes that axis begin at 0; with `equal` both axes have the same scale.
+    """
     if not traces:
         return None
     return {"title": title, "x": x, "y": y, "zero": zero, **({"equal": True} if equal else {}),

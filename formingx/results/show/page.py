@@ -58,7 +58,9 @@ def picture(png: bytes, caption: str, kind: str) -> str:
 
 def logarithmic(lines: list[list[float]], x: str, y: str, caption: str) -> str:
     """Return a small figure of lines with a logarithmic vertical axis and a caption, as HTML with an SVG drawing.
-    Values of a line are positive, drawn over 1, 2, 3, ...; empty lines are left out."""
+
+    Values of a line are positive, drawn over 1, 2, 3, ...; empty lines are left out.
+    """
     values = [value for line in lines for value in line]
     low, high = math.floor(math.log10(min(values))), math.ceil(math.log10(max(values)))
     high, longest = max(high, low + 1), max(max(map(len, lines)), 2)

@@ -7,7 +7,9 @@ from ...figures import new_axes
 
 def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
     """Draw one output quantity of a path over another on matplotlib axes, and return them (`Path.plot`).
-    States are dots on a smooth line. Limit points are circled; states after a snap-through are diamonds."""
+
+    States are dots on a smooth line. Limit points are circled; states after a snap-through are diamonds.
+    """
     axes = axes if axes is not None else new_axes()
     drawn, = axes.plot(*path.curve(x, y), **style)
     axes.plot(path[x], path[y], ".", color=drawn.get_color())
@@ -21,6 +23,7 @@ def curve(path: Any, y: str, x: str, axes: Any = None, **style: Any) -> Any:
 
 def convergence(path: Any, axes: Any = None) -> Any:
     r"""Draw the relative correction of the unknowns x over the number of the Newton iteration, one line for each state.
+
     It is the measure of convergence of Song 1993, eq. (3.5.1); figures 3.2 and 5.7 there are of this kind:
 
     .. math:: |\Delta x| / |x|
@@ -37,8 +40,10 @@ def convergence(path: Any, axes: Any = None) -> Any:
 
 def main_columns(columns: list[str]) -> tuple[str, str]:
     """Return the names (x, y) of the columns of the main loading curve.
+
     It is the tool force over the travel, else the pressure or, over time, the pole height. Enclosed volume, strain
-    energy or volume error replace a missing pole height."""
+    energy or volume error replace a missing pole height.
+    """
     travel = next((c for c in columns if c.endswith("travel")), None)
     if travel:
         own_force = travel.replace("travel", "force")
@@ -53,7 +58,9 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
 
 def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
     """Draw the section of a deformed sheet as coloured strips between its two faces.
-    `scale` multiplies r and z; colours at the nodes are (red, green, blue, opacity) from 0 to 1, shape (n, 4)."""
+
+    `scale` multiplies r and z; colours at the nodes are (red, green, blue, opacity) from 0 to 1, shape (n, 4).
+    """
     import numpy as np
     from matplotlib.collections import PolyCollection
     rows = profile.through_wall() * scale
@@ -65,7 +72,9 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
 
 def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
     """Return the lower left and upper right corner (r, z) of a box around sheets, length, with 6 % margin.
-    `mirrored` includes the mirror images at r = 0."""
+
+    `mirrored` includes the mirror images at r = 0.
+    """
     import numpy as np
     points = np.vstack([profile.outline for profile in profiles])
     low, high = points.min(0), points.max(0)

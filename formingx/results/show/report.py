@@ -68,8 +68,10 @@ def report(runs: Sequence[Any], file: Any = "report.html", title: str = "", *, n
 def write(records: ReportData | list[ReportData], file: Any, title: str, failure: Any, comm: Any, units: Units = NONE,
           density: float | None = None, trim: Any = None, names: list[str] | None = None) -> FilePath:
     """Write the report of one or several records, and return its path (`report`, `Path.report`).
+
     The density is in g/cm3, a trim is a radius or ("height", h), length. Another ending, no plotly, or a density
-    without a sheet is an InputError, a failed file an OSError."""
+    without a sheet is an InputError, a failed file an OSError.
+    """
     records = [records] if isinstance(records, ReportData) else records
     names, file = names or [title or "run"], files.named("report", file, ".html", ".htm")
 
@@ -87,7 +89,9 @@ def write(records: ReportData | list[ReportData], file: Any, title: str, failure
 
 def _part(record: ReportData, units: Units, density: float | None, trim: Any) -> Part | None:
     """Return the key numbers of the part in the last state of a run, or None for no sheet in a section.
-    A density (g/cm3) or a trim without a part is an InputError."""
+
+    A density (g/cm3) or a trim without a part is an InputError.
+    """
     if record.profiles[-1] is None:
         if density is not None or trim is not None:
             raise InputError(f"report: {'density' if density is not None else 'trim'}: "
@@ -100,8 +104,10 @@ def _part(record: ReportData, units: Units, density: float | None, trim: Any) ->
 def _page(records: list[ReportData], names: list[str], parts: list, title: str, failure: Any, units: Units,
           findings: list[Finding]) -> str:
     """Return the report as an HTML page.
+
     `parts` has for each run its `Part` or None; `failure` is the error that ended the run, or None. `findings` are on
-    parts of the report that failed."""
+    parts of the report that failed.
+    """
     alone, attempts = len(records) == 1, Attempts()
     body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{introduction(records[0], units)}</p>"]
     for record, name in zip(records, names):
@@ -145,7 +151,9 @@ and WebGL: Chrome 80, Firefox 113, Safari 16.4 or later); the tables need nothin
 
 def _trouble(failure: Any, lead: str, attempts: Attempts) -> list[str]:
     """Return the error message of a failed run as HTML, with a picture of its last admissible state.
-    `lead` is the text before the heading, such as the name of the run. `attempts` collects the error of a picture."""
+
+    `lead` is the text before the heading, such as the name of the run. `attempts` collects the error of a picture.
+    """
     if not failure:
         return []
     found = [f"<div class='note bad'><h2>{html.escape(lead)}The run could not go on</h2>"
@@ -182,7 +190,9 @@ def _details(record: ReportData, units: Units, attempts: Attempts) -> list[str]:
 
 def _warnings(record: ReportData, lead: str = "") -> str:
     """Return the findings on a run as HTML, or a sentence that there are none.
-    The page shows two lines of each, after the text `lead`, and the whole after a click."""
+
+    The page shows two lines of each, after the text `lead`, and the whole after a click.
+    """
     findings = record.all_findings()
     if record.space:
         lead = f"<p class=note>{html.escape(lead)}Only curves and inputs are shown: {_NO_MESH}.</p>"
@@ -262,7 +272,9 @@ def introduction(record: ReportData, units: Units) -> str:
 
 def _key_numbers(record: ReportData, units: Units) -> str:
     """Return an HTML table of all output quantities, and of the smallest and largest wall over original thickness.
-    The values in each limit point and in the last state stand side by side."""
+
+    The values in each limit point and in the last state stand side by side.
+    """
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
     chosen.append(len(record.kinds) - 1)
@@ -276,8 +288,10 @@ def _key_numbers(record: ReportData, units: Units) -> str:
 
 def _stages(record: ReportData, units: Units) -> str:
     """Return an HTML table with a row per stage.
+
     A row has the numbers of states and iterations, the controls at the end, the largest force on each tool, the largest
-    gap in a corner at the end, and the smallest wall over original thickness at the end."""
+    gap in a corner at the end, and the smallest wall over original thickness at the end.
+    """
     columns = [c for end in CONTROLS for c in record.measures if c.endswith(end)]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
@@ -358,7 +372,9 @@ def _convergence(record: ReportData) -> str:
 
 def _iterations(record: ReportData, units: Units) -> str:
     """Return an HTML table of the Newton iterations of each state that the report draws.
-    A row has the control, the relative correction of the unknowns in each iteration, and the last residual."""
+
+    A row has the control, the relative correction of the unknowns in each iteration, and the last residual.
+    """
     controls = {k: record.control(k) for k in record.frames}
     rows, columns = [], list(dict.fromkeys(controls.values()))
     for k, control in controls.items():

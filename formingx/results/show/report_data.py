@@ -98,7 +98,9 @@ class ReportData:
 
     def control(self, state: int) -> str:
         """Return the column of the controlled quantity in the stage of a state.
-        It is the first pressure, travel or displacement that changes; without one, or in time, the first column."""
+
+        It is the first pressure, travel or displacement that changes; without one, or in time, the first column.
+        """
         first, end = next(ends for ends in self.stage_ranges if state < ends[1])
         changes = [c for c, v in self.measures.items()
                    if c.endswith(CONTROLS) and np.ptp(v[first:end]) > 1e-9 * np.ptp(v)]
@@ -132,7 +134,9 @@ class ReportData:
 
     def all_findings(self) -> list[Finding]:
         """Return all findings on the run, the worst first.
-        They are the findings of its checks (`findings`), and those on the values of its columns in all states."""
+
+        They are the findings of its checks (`findings`), and those on the values of its columns in all states.
+        """
         found = []
         if self.until is not None and self.until[0] in self.measures:
             last, (name, value) = self.measures[self.until[0]][-1], self.until
@@ -253,7 +257,9 @@ def of_path(path: Any) -> ReportData:
 
 def _fields_of(path: Any, drawn: Any, last: Profile, done: Callable[[float], Any]) -> list[dict[str, np.ndarray]]:
     """Return the fields of each state of a path (`ReportData.fields`); collective.
-    drawn: numbers of the drawn states. last: profile in the last state. done: called with the fraction that is done."""
+
+    drawn: numbers of the drawn states. last: profile in the last state. done: called with the fraction that is done.
+    """
     found: list[dict[str, np.ndarray]] = [{} for _ in path.states]
     fields = {id(entry): _Fields(path._same_mesh(entry.states[0]), last) for entry in path.record.segments}
     for i, k in enumerate(drawn):
@@ -264,7 +270,9 @@ def _fields_of(path: Any, drawn: Any, last: Profile, done: Callable[[float], Any
 
 def of_checkpoint(about: dict, states: list[dict]) -> ReportData:
     """Return the data of a run for its report from its checkpoint, without the scene.
-    Both arguments are results of `formingx.results.files.checkpoint_data.contents`."""
+
+    Both arguments are results of `formingx.results.files.checkpoint_data.contents`.
+    """
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     ended = about.get("ended") or {"findings": (), "failure": ""}
     tooling = Tooling.of_description(about["scene"])
@@ -295,7 +303,9 @@ def _heat(heat: dict[str, Any] | None) -> dict[str, Any]:
 
 def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np.ndarray]]:
     """Return {"temperature": values (m,) at the nodes of a sheet}, or {}, in the states of a checkpoint.
-    The stored history variables in "memory" have "points" and "temperature"; `last` is the profile with m nodes."""
+
+    The stored history variables in "memory" have "points" and "temperature"; `last` is the profile with m nodes.
+    """
     found: list[dict[str, np.ndarray]] = [{} for _ in states]
     numbers = None
     for values, state in zip(found, states):
@@ -310,7 +320,9 @@ def _temperatures(states: list[dict], last: Profile | None) -> list[dict[str, np
 
 def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: int = FRAMES) -> list[int]:
     """Return the numbers of about `count` states to be drawn, in order, with ends of stages and limit points.
-    The others are even over the mean of progress, (n,), from 0 to 1, and number of the state."""
+
+    The others are even over the mean of progress, (n,), from 0 to 1, and number of the state.
+    """
     n = len(progressed)
     marked = {k for k in range(n) if kinds[k] == "limit point" or stages[k:k + 2] != [stages[k]] * 2} | {0, n - 1}
     position = (progressed + np.linspace(0, 1, n)) / 2
@@ -320,9 +332,11 @@ def frames(progressed: np.ndarray, kinds: list[str], stages: list[str], count: i
 
 def progress(measures: dict[str, np.ndarray], profiles: list[Any]) -> np.ndarray:
     """Return the progress of a process in n states, from 0 to 1, shape (n,).
+
     It is proportional to process time; in stages without time, a control over its range counts a quarter of the total.
     In a run without time, a step adds the mean change of controls over their ranges, and the mean displacement of the
-    middle line over the sum of all."""
+    middle line over the sum of all.
+    """
     n = len(profiles)
     steps, clock = np.zeros(n), measures.get("process_time", np.zeros(n))
     driven = [measures[c] for c in measures if c.endswith(CONTROLS)]
@@ -347,8 +361,10 @@ def words(name: str) -> str:
 
 class _Fields:
     """Stress, contact pressure and temperature of a sheet, evaluated at the m nodes of its profile.
+
     At each node the stress is the largest principal Cauchy stress, the larger one of its values at both faces. The
-    temperature is the mean of both faces."""
+    temperature is the mean of both faces.
+    """
 
     def __init__(self, path: Any, profile: Profile):
         self._path, self._points = path, [profile.reference_bottom, profile.reference_top]

@@ -36,7 +36,9 @@ def camera_direction(camera: Any, default: tuple[float, float, float]) -> np.nda
 
 def revolved(profile: Any, file: Any, comm: Any, camera: Any = None) -> None:
     """Draw three quarters of an axisymmetric sheet, coloured by the wall ratio, as a PNG (rank 0 draws).
-    A sheet more than twice as high as wide is drawn as one half. Another ending, or no screen, is an InputError."""
+
+    A sheet more than twice as high as wide is drawn as one half. Another ending, or no screen, is an InputError.
+    """
     low, high = _bounds(profile)
     tall = high[1] - low[1] > 4 * high[0]
     turn, default = (np.pi, (1.2, -3.4, 1.2)) if tall else (1.5 * np.pi, (2.0, -3.4, 1.9))
@@ -51,7 +53,9 @@ def revolved(profile: Any, file: Any, comm: Any, camera: Any = None) -> None:
 
 def extruded(profile: Any, file: Any, comm: Any, camera: Any = None) -> None:
     """Draw a sheet in plane strain, extruded to 1.5 times its width, as a PNG (rank 0 draws).
-    The colour is the wall ratio. Another ending, or no screen, is an InputError."""
+
+    The colour is the wall ratio. Another ending, or no screen, is an InputError.
+    """
     low, high = _bounds(profile)
     width = high[0] - low[0]
 
@@ -70,8 +74,10 @@ def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: np.ndarray, file: Any) -> None:
     """Draw the surface that a section sweeps out as a PNG on this rank.
+
     `place` maps points (n, 2) and one of the `stations` (m,) to x, y, z, (n,) each. The camera is a direction from the
-    sheet."""
+    sheet.
+    """
     pyvista = figures.pyvista()
 
     def swept(line, values):
@@ -102,7 +108,9 @@ def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: np.ndarra
 @contextlib.contextmanager
 def plotted(file: Any, height: int = 800) -> Iterator[Any]:
     """Write a PNG picture of the meshes that a `with` block adds to the yielded pyvista plotter.
-    It is 1000 pixels wide. Without a screen or Xvfb an InputError is raised."""
+
+    It is 1000 pixels wide. Without a screen or Xvfb an InputError is raised.
+    """
     pyvista = figures.pyvista()
     picture = io.BytesIO()
     with screen():
@@ -119,7 +127,9 @@ def plotted(file: Any, height: int = 800) -> Iterator[Any]:
 
 def shading(values: np.ndarray, name: str = "") -> dict[str, Any]:
     """Return arguments of pyvista's `add_mesh` that colour by "ratio", (n,), with a colour bar over its range.
-    The values are those of `name`; without it they are walls over the original wall."""
+
+    The values are those of `name`; without it they are walls over the original wall.
+    """
     least = 1e-6 * float(np.abs(values).max()) if name else 0.01
     middle, half = (values.max() + values.min()) / 2, max(np.ptp(values), least) / 2    # a flat sheet is of one colour
     bar = {"title": f"{name}\n" if name else "thickness /\noriginal\n", "color": "black", "vertical": True,
@@ -147,8 +157,10 @@ def look(plotter: Any, camera: Any, points: np.ndarray) -> None:
 @contextlib.contextmanager
 def screen() -> Iterator[None]:
     """Provide a display within a `with` block: the present one, or a virtual one (Xvfb) that ends with it.
+
     VTK before 9.5 aborts without; later it needs none with EGL or OSMesa. If one is needed and missing, an InputError
-    is raised."""
+    is raised.
+    """
     if os.environ.get("DISPLAY"):
         yield
         return
@@ -187,7 +199,9 @@ _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
 @functools.cache
 def _window_without_screen() -> str | None:
     """Return the kind of window that VTK draws here without a display, or None.
-    Another process tries, because VTK crashes where it cannot draw."""
+
+    Another process tries, because VTK crashes where it cannot draw.
+    """
     script = ("import vtkmodules.vtkRenderingOpenGL2; from vtkmodules.vtkRenderingCore import vtkRenderWindow;"
               "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8); w.Render()")
     for window in (os.environ.get(_WINDOW, "vtkEGLRenderWindow"), "vtkOSOpenGLRenderWindow"):

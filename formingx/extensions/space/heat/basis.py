@@ -40,7 +40,9 @@ class Layer:
 
     def gauss(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return depths (0 to 1 in the layer) and weights of a Gauss rule, shape (count,), and its shape functions.
-        The shape functions of the m points of the layer at these depths have the shape (count, m)."""
+
+        The shape functions of the m points of the layer at these depths have the shape (count, m).
+        """
         at, weights = np.polynomial.legendre.leggauss(count)
         depths = (at + 1) / 2
         return depths, weights / 2, lagrange(gauss_lobatto(len(self.weights) - 1)[0], depths)
@@ -48,6 +50,7 @@ class Layer:
 
 class ColumnBasis:
     """Basis of the temperatures through the thickness of a sheet, with m points.
+
     shares: thickness of each layer over that of the sheet, from the bottom up; properties, names: of each layer.
 
     Attributes:
@@ -92,7 +95,9 @@ class ColumnBasis:
 @cache
 def gauss_lobatto(order: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return points, weights and derivatives of the Gauss-Lobatto rule on [0, 1] with `order` + 1 = m points.
-    Shapes (m,), (m,) and (m, m). Entry (i, j) of the last is the slope at point i of the polynomial that is 1 at j."""
+
+    Shapes (m,), (m,) and (m, m). Entry (i, j) of the last is the slope at point i of the polynomial that is 1 at j.
+    """
     legendre = np.polynomial.legendre
     P = np.eye(order + 1)[order]
     x = np.concatenate([[-1.0], np.sort(legendre.legroots(legendre.legder(P)).real), [1.0]])
@@ -122,7 +127,9 @@ def layer_shares(scene: Any) -> dict[str, float]:
 
 def basis_of(scene: Any, materials: Any) -> ColumnBasis:
     """Return the basis of the columns of a scene, whose first layer is at the bottom.
-    materials: {layer: `ThermalProperties`}, or one for all layers."""
+
+    materials: {layer: `ThermalProperties`}, or one for all layers.
+    """
     materials = materials if isinstance(materials, Mapping) else dict.fromkeys(scene.mesh.layers, materials)
     shares = layer_shares(scene)
     return ColumnBasis([*shares.values()], [materials[name] for name in shares], [*shares])

@@ -16,8 +16,10 @@ from .columns import ColumnConduction
 
 class ColumnHistory(CoolingHistory):
     """History variables of the temperature of a sheet in three dimensions.
+
     `HeatState.temperature` has the temperatures of the columns, shape (n, m), at m points through the thickness of the
-    n locally owned nodes."""
+    n locally owned nodes.
+    """
 
     def _conduction(self, degree: int = 2) -> ColumnConduction:
         scene, zero = self._problem.scene, ABSOLUTE_ZERO[self._cooling.unit]

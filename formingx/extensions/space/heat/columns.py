@@ -37,6 +37,7 @@ _CONVERGED = 1e-10
 
 class ColumnConduction:
     """Heat conduction in a column at each of the n locally owned nodes of a sheet, and in the tools that touch it.
+
     It has the methods that `formingx.extensions.heat.stepping` and the history of a `Cooling` call on a `Conduction`.
     The first array of a temperature state has the temperatures of the columns, shape (n, m), which begin at `start`,
     shape (n,). Entries of M and R are divided by `capacity`.
@@ -99,7 +100,9 @@ class ColumnConduction:
 
     def rates(self, state: list[np.ndarray]) -> tuple[list[np.ndarray], np.ndarray]:
         """Return the rates of heat M dT/dt, with the shapes of `state`, and the heat per time of laws and tools.
-        Rates of the columns are over `capacity`, degrees per time; those of tools per contact area."""
+
+        Rates of the columns are over `capacity`, degrees per time; those of tools per contact area.
+        """
         T, found, through = state[0], [], []
         fluxes = [law.flux(T[:, law.point])[0] for law in self._laws]
         R = self._rate(T, fluxes)
@@ -116,7 +119,8 @@ class ColumnConduction:
 
         .. math:: M \Delta = k + c R(y + \Delta)
 
-        `state` (y) and `known` (k) are temperature states; c is in units of time; `guess` is not used."""
+        `state` (y) and `known` (k) are temperature states; c is in units of time; `guess` is not used.
+        """
         T = state[0]
         responses = [touch.response(excess, k, c) for touch, excess, k in zip(self.tool_contacts, state[1:], known[1:])]
         sources = sum(self._absorbed) + self.power
@@ -166,8 +170,10 @@ class ColumnConduction:
     def _solve(self, T: np.ndarray, forced: np.ndarray, c: float, laws: Sequence[Any],
                responses: Sequence[Any]) -> tuple[np.ndarray, list[np.ndarray]]:
         """Return the change of the columns in an implicit stage, shape (n, m), and the fluxes of the laws, (n,) each.
+
         forced: right-hand side without fluxes at the faces, shape (n, m). In terms of modes the matrix is diagonal; a
-        flux changes both faces by the compliance Z. Newton's method finds the temperatures of the faces."""
+        flux changes both faces by the compliance Z. Newton's method finds the temperatures of the faces.
+        """
         modes, ends = self.basis.modes, [0, len(self.basis.depths) - 1]
         decay = 1 / (1 + c * np.outer(1 / self.thickness**2, self.basis.rates))
         free = decay * ((forced / self._share[:, None]) @ modes)                 # modes of the change without fluxes

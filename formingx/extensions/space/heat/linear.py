@@ -20,7 +20,9 @@ _SPAN = 30.0
 
 def is_linear(scene: Any, layer: str) -> bool:
     """Return True if the energy of a layer at the mean of its constants is the mean of its energies; collective.
-    This holds for elastic materials whose temperature-dependent constants are moduli."""
+
+    This holds for elastic materials whose temperature-dependent constants are moduli.
+    """
     material, sample = scene.materials[layer], scene.sample(layer)
     if material.internal or material.integral:
         return False

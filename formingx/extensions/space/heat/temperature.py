@@ -17,6 +17,7 @@ from .nodes import SheetNodes
 
 class ColumnTemperature:
     """Temperature of a sheet at the last accepted state; it replaces `formingx.forms.temperature.Temperature`.
+
     given: temperature of the scene, uniform through the thickness.
 
     Attributes:
@@ -42,7 +43,9 @@ class ColumnTemperature:
 
     def last_two_states(self, cells: np.ndarray, places: np.ndarray, layer: str) -> np.ndarray:
         """Return temperatures at q places of cells and the points of a layer, now and before, within `limits`.
-        The shape is (1 or 2, cells, q, points)."""
+
+        The shape is (1 or 2, cells, q, points).
+        """
         points, nodes = self.basis.layers[layer].points, self.sheet.cells(cells)
         shapes = np.asarray(self._element.tabulate(0, places)[0])
         states = [self.now] if self.before is None else [self.now, self.before]
@@ -57,7 +60,9 @@ class ColumnTemperature:
 
     def at_points(self, points: np.ndarray, depth: np.ndarray | None = None) -> np.ndarray:
         """Return the temperatures at reference points, shape (n, 2 or 3), and depths from 0 to 1; collective.
-        depth: shape () or (n,); None: 0.5."""
+
+        depth: shape () or (n,); None: 0.5.
+        """
         points = np.asarray(points, dtype=float)
         at = np.broadcast_to(0.5 if depth is None else depth, len(points))
         if self.sheet.comm.size == 1:                        # all nodes need no search in the triangles
