@@ -425,9 +425,15 @@ def test_an_adhering_plate_pulls_a_block_in_uniaxial_tension(friction):
     assert path.last.measures["contact_length"] == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize("friction, in_space", [("stick", False), (0.3, True), ("none", True)])
+def test_points_separate_by_default_unless_they_stick_in_three_dimensions(friction, in_space):
+    assert fx.Contact("top", TOOL, friction).separates is True
+    assert fx.Contact("top", tools.revolved(TOOL), friction).separates is in_space
+
+
 @pytest.mark.parametrize("change, message", [
     (lambda: fx.Contact("top", TOOL, 0.3, separates=False), "has no Coulomb friction"),
-    (lambda: fx.Contact("top", TOOL, separates="no"), "must be True or False"),
+    (lambda: fx.Contact("top", TOOL, separates="no"), "must be True, False or None"),
     (lambda: fx.Contact("top", TOOL, -0.1), "must not be negative"),
     (lambda: fx.Contact("top", TOOL, "glue"), "must be 'stick', 'none' or a coefficient"),
     (lambda: fx.Contact("top", "cup"), "must be a tool"),

@@ -77,10 +77,10 @@ class Contact(ScenePart):
         elastic_slip: elastic slip g_s, the tangential motion of a point before it slides, divided by the thickness of
             the sheet. A sheet in three dimensions that is thinner than 0.01 times its extent L has the ramp and the
             slip of the thickness 0.01 L, and a penalty so soft that its penetration over L is that of this thickness.
-        separates: False: points that have been in contact stay in contact, with "stick" or "none". Examples are a tacky
-            sheet, or a plug to which the sheet is bonded. The default is True. In three dimensions the default for
-            "stick" is False: a point stays in contact until a stage of a process makes the tool inactive. With True,
-            points under tension separate there, for materials that do not relax.
+        separates: True: points under tension separate from the tool. False: points that have been in contact stay in
+            contact, until a stage of a process makes the tool inactive. None: True, except for "stick" in three
+            dimensions. False is for "stick", and in a section for "none", such as a tacky sheet or a plug to which the
+            sheet is bonded. True with "stick" in three dimensions is for materials that do not relax.
         nodes_per_step: largest number of nodes that come into contact in one step, or their share of the nodes of the
             face, below 1. The results of stick, friction and heat exchange depend on the time of contact. In three
             dimensions None means the share 0.01. In a section None means 1 node; an element edge has two. If any face
@@ -99,6 +99,7 @@ class Contact(ScenePart):
         driven: True if the tool moves: its travel is then a load parameter (control) of the run.
         friction_by_temperature: True if the coefficient of friction depends on the temperature of the body.
         sticks: True if points in contact never slide: with "stick", and for mu of 100 or larger.
+        separates: the argument `separates`, or its value for None.
         lagged: True for tools in three dimensions. A point whose gap closes in a step is then in contact from the next
             step on.
         max_closures: `nodes_per_step`, or its value for None.
@@ -130,9 +131,9 @@ class Contact(ScenePart):
         self.sticks = not self.friction_by_temperature and self.mu >= STICKS
         self.driven, self.lagged = direction is not None, tool.components == 3
         three_d = self.lagged
-        usually = not three_d or not self.sticks
+        usually = not (three_d and self.sticks)
         self.separates = check_type(f"{name}: separates", usually if separates is None else separates, bool,
-                                  "True or False")
+                                    "True, False or None")
         usual = _BONDED if three_d or not self.separates else _STICK if self.sticks else _SLIDES
         self.penalty = positive(f"{name}: penalty", usual[0] if penalty is None else penalty)
         self.ramp = positive(f"{name}: ramp", usual[1] if ramp is None else ramp)
