@@ -122,10 +122,7 @@ def _demos() -> dict[str, str]:
 
 
 def _demo(words: list[str]) -> None:
-    """Run a demo in this process, like `python demos/NAME.py OPTIONS`, also under mpirun.
-
-    words: its name and its options.
-    """
+    """Run a demo in this process, like `python demos/NAME.py OPTIONS`, also under mpirun; words: name and options."""
     demos = _demos()
     listed = ", ".join(demos) or f"none; {os.fspath(_folder())} holds no demo"
     if not words:
@@ -152,10 +149,7 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _compare(options: argparse.Namespace) -> None:
-    """Run the command `compare`: print the differences of two curves, and write a picture and a table of pairs.
-
-    `options` has the files `ours` and `theirs`, their `columns` and `units`, and the folder `out`.
-    """
+    """Run `compare`: print the differences of two curves, and write a picture and a table of pairs to folder `out`."""
     comm = MPI.COMM_WORLD
     columns = {our: their or our for our, their in (_pair("--columns", word, False) for word in options.columns)}
     units: dict[str, float | str] = {}
@@ -182,10 +176,7 @@ def _open(options: argparse.Namespace) -> None:
 
 
 def _states(record: report.ReportData) -> list[str]:
-    """Return the lines of a table of states of a recorded run.
-
-    They show limit points, jumps, the last state of each stage, and evenly spaced other states.
-    """
+    """Return the lines of a table of states of a run: limit points, jumps, ends of stages, and others evenly spaced."""
     ends = ("process_time", "pressure", "travel", "displacement", "pole_height", "pole_stretch", "contact_length")
     columns = [c for end in ends for c in record.measures if c.endswith(end)][:6]
     n, stages = len(record.kinds), record.stages
@@ -231,10 +222,7 @@ def _watch(options: argparse.Namespace) -> None:
 
 
 def _pair(option: str, word: str, both: bool) -> tuple[str, str]:
-    """Return the two parts of the value OURS=THEIRS of an option; another form is an InputError.
-
-    both: True if both parts are needed; otherwise OURS alone gives (OURS, "").
-    """
+    """Return the parts of OURS=THEIRS, else an InputError; unless `both` are needed, OURS alone gives (OURS, "")."""
     ours, equals, theirs = word.partition("=")
     if not ours or (equals or both) and not theirs:
         raise InputError(f"{option} {word!r}: must be {'COLUMN=UNIT or COLUMN=FACTOR' if both else 'OURS=THEIRS'}")

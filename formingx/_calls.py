@@ -88,10 +88,7 @@ def _explain_methods(cls: type) -> None:
 
 
 def _explained(call: Callable, name: str, skip: int) -> Callable:
-    """Return a function that calls another function, and turns its errors into messages about wrong arguments.
-
-    A user does not write the first `skip` arguments (self, cls).
-    """
+    """Return `call` with messages about wrong arguments; a user does not write the first `skip` ones (self, cls)."""
     if getattr(call, "_is_explained", False) or inspect.isgeneratorfunction(call):
         return call
 
@@ -117,10 +114,7 @@ def _explained(call: Callable, name: str, skip: int) -> Callable:
 
 
 def _fault(call: Callable, name: str, skip: int, args: tuple, given: dict[str, Any]) -> str | None:
-    """Return the fault in the arguments of a call as text, or None if they fit the signature and its annotations.
-
-    A user does not write the first `skip` arguments (self, cls).
-    """
+    """Return the fault in the arguments of a call, without the first `skip`, as text; None if they fit."""
     signature = inspect.signature(call)
     try:
         bound = signature.bind(*args, **given).arguments

@@ -59,10 +59,7 @@ class _Numbered(MultiFunction):
 
 
 def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
-    """Compile UFL forms, the same on all ranks, by one call of the compiler; collective.
-
-    It takes less time than a call for each. `compile_form` then finds them.
-    """
+    """Compile UFL forms, the same on all ranks, in one call of the compiler, for `compile_form` to find; collective."""
     options, form_options = jit.get_options(JIT_OPTIONS), ffcx.get_options({"scalar_type": default_scalar_type})
     if not _jit.supported(options):
         return
@@ -72,10 +69,7 @@ def compile_ahead(comm: Any, forms: Sequence[Any]) -> None:
 
 
 def _compiled_by_jit(request: Callable[[], Any]) -> Any:
-    """Return the form or expression that `request` makes by DOLFINx, with `_jit` in place of its compiler.
-
-    Each form is compiled once in a process.
-    """
+    """Return the form or expression that `request` makes by DOLFINx and `_jit`; it is compiled once in a process."""
     compiler = jit.ffcx_jit
 
     def compile_once(comm: Any, item: Any, form_compiler_options: Any, jit_options: dict[str, Any],
@@ -102,10 +96,7 @@ _made: list[None] = []
 
 
 def collect_communicators() -> None:
-    """Free, now and then, the communicators of meshes and problems that are no longer used; collective.
-
-    Each new mesh and problem calls it. Objects that refer to each other are freed by a collection of garbage alone.
-    """
+    """Free, now and then, communicators of unused meshes and problems, by a collection of garbage; collective."""
     _made.append(None)
     if len(_made) >= _UNCOLLECTED:
         _made.clear()

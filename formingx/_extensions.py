@@ -13,10 +13,7 @@ _FOLDER = Path(__file__).parent / "extensions"
 
 @contextlib.contextmanager
 def optional() -> Iterator[None]:
-    """Skip the import of an extension in a `with` block if its folder is missing.
-
-    Another missing module is a ModuleNotFoundError.
-    """
+    """Skip an import whose extension's folder is missing; another missing module is a ModuleNotFoundError."""
     try:
         yield
     except ModuleNotFoundError as error:

@@ -78,10 +78,7 @@ def compile_together(comm: Any, items: dict[str, Any], jit_options: dict[str, An
 
 def _open_libraries(items: dict[str, Any], folder: Path, form_options: dict[str, Any], jit_options: dict[str, Any]
             ) -> dict[str, Any]:
-    """Return {name of the library: result of `_load`} of all items; build the missing libraries.
-
-    A failed compiler or loading is a RuntimeError.
-    """
+    """Return {library: result of `_load`} of all items, built where missing; a failure is a RuntimeError."""
     ffi = _declarations(np.dtype(form_options["scalar_type"]).name)
     found = {name: _load(ffi, name, item, folder) for name, item in items.items()}
     if not all(found.values()):
@@ -151,10 +148,7 @@ def _c_code(item: Any, name: str, form_options: dict[str, Any]) -> str:
 
 
 def library(name: str, code: str, flags: tuple[str, ...]) -> Path:
-    """Return the path of a shared library of C functions; compile it if the cache does not contain it.
-
-    No compiler is an InputError, its failure a RuntimeError.
-    """
+    """Return the path of a cached or compiled library of C functions; InputError: no compiler, RuntimeError: failed."""
     compiler = _compiler()
     if compiler is None:
         raise InputError("formingx compiles its equations, and there is no C compiler: install Debian's packages gcc"

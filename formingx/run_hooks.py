@@ -51,10 +51,7 @@ class MeshAdaptation(Protocol):
         """Raise an InputError if `mesh` cannot be adapted."""
 
     def make(self, path: Path, options: Mapping[str, float]) -> Mesh:
-        """Return a mesh of the same body, adapted to the states of a first run by options of `formingx.mesh.adapted`.
-
-        The caller has checked the names.
-        """
+        """Return a mesh of the body adapted to a first run, by checked options of `formingx.mesh.adapted`."""
 
 
 def check_argument(caller: str, argument: str, given: Any, what: str) -> None:

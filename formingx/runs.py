@@ -294,18 +294,12 @@ class Process:
         return path
 
     def _check_tool_paths(self, plan: Plan, travel: Callable[[int], float]) -> None:
-        """Check that the tools can move as a stage states, from the travels of items at its start, length.
-
-        Raise `InputError` if one cannot.
-        """
+        """Raise an InputError if a tool cannot move as a stage states from travels at its start, length."""
         contacts = {i: travel(i) for i, item in enumerate(self.scene.items) if item in self.scene.contacts}
         clearance.check(self.scene, [plan], contacts)
 
     def _check_stages(self, stages: Any) -> list[Stage]:
-        """Return the argument `stages` of `run` as a list.
-
-        Raise `InputError` if there is no stage, or if two have the same name.
-        """
+        """Return the argument `stages` of `run` as a list; no stage, or two of one name, are an InputError."""
         stages = as_list("Process: stages", stages,
                          "stages, such as Stage('vacuum', control=vacuum, until=pressure(1))")
         if not stages:

@@ -26,10 +26,7 @@ def sign_towards(contact: Contact, load: Any) -> float:
 
 
 def free_distance(tool: RigidTool, points: np.ndarray, directions: np.ndarray, limit: float) -> np.ndarray:
-    """Return the distances along unit directions, (n, c), from outside points to a tool, shape (n,), length.
-
-    A tool that is not met within `limit`, length, has infinity.
-    """
+    """Return distances (n,) of outside points (n, c) from a tool along unit directions, length; inf beyond `limit`."""
     distance = np.zeros(len(points))
     rows: np.ndarray = np.arange(len(points))
     for _ in range(1000):                                    # the gap to the tool is a safe advance

@@ -11,10 +11,7 @@ WITHOUT_GAIN = 1_150_000
 
 
 def unknowns(scene: Scene) -> int:
-    """Return the approximate number of unknowns of a scene, without compiling its forms; collective.
-
-    Lagrange multipliers are not counted; a continuous pressure counts once at an interface between layers.
-    """
+    """Return about the number of unknowns of a scene, without multipliers, and without compiling; collective."""
     topology = scene.mesh.domain.topology
     topology.create_entities(1)
     vertices, edges, cells = (topology.index_map(dim).size_global if dim <= topology.dim else 0 for dim in (0, 1, 2))

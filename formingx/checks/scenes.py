@@ -31,10 +31,7 @@ def _driven(body: SizedBody) -> Iterator[Finding]:
 
 @register("scene")
 def _edges(body: SizedBody) -> Iterator[Finding]:
-    """Report edges without a support of a sheet in three dimensions.
-
-    A flat membrane has no stiffness normal to its plane.
-    """
+    """Report edges without a support of a sheet in three dimensions: a flat membrane has no stiffness normal to it."""
     if body.scene.kinematics.components == 3:
         mesh: Any = body.scene.mesh
         supported = {support.on for support in body.scene.supports}

@@ -18,10 +18,7 @@ from .check import Report, check
 
 
 class _DryRun(BaseException):
-    """Exception raised in place of the first run of a script.
-
-    It is not an `Exception`, so that a script does not catch it.
-    """
+    """Exception in place of the first run of a script, which does not catch it: it is not an `Exception`."""
 
     def __init__(self, report: Report):
         super().__init__()
@@ -62,10 +59,7 @@ def _check_python(file: Path) -> None:
 
 @contextmanager
 def _no_runs() -> Iterator[None]:
-    """Replace functions that run a scene, such as `trace`, by a check of the scene within a `with` block.
-
-    After the check, the replacement raises `_DryRun`.
-    """
+    """Replace functions that run a scene, such as `trace`, by its check and a `_DryRun` within a `with` block."""
     def trace(scene, *, until, intermediate=(), **_):
         raise _DryRun(check(scene, targets=[*intermediate, until]))
 

@@ -92,10 +92,7 @@ class SizedBody(Triangles):
         return f"{value:.{digits}g} {self._units.unit_of(kind)}".rstrip()
 
     def _prescribed_values(self, target: Target, control: Any) -> list[PrescribedValue]:
-        """Return a list with the prescribed value of a target that is a pressure or a travel; else an empty list.
-
-        A target without a name belongs to the `control` of the run.
-        """
+        """Return [pressure or travel of a target], or []; without a name it is that of the `control` of the run."""
         name, _, quantity = str(target.name).rpartition("_")
         if quantity not in ("pressure", "travel"):
             return []
@@ -214,10 +211,7 @@ def _pressures(body: SizedBody) -> Found:
 
 @register("scene")
 def _limit_pressures(body: SizedBody) -> Found:
-    """Report pressures above the pressure maximum of a sheet or tube without tools.
-
-    Materials that stiffen enough have no such maximum.
-    """
+    """Report pressures above the maximum of a sheet or tube without tools; materials that stiffen enough have none."""
     for face in body.pressurised_faces:
         if body.scene.contacts or (peak := face.peak()) is None:
             continue

@@ -17,10 +17,7 @@ from .mould_side import moulds
 
 @register("end")
 def untouched(path: Any) -> Iterator[Finding]:
-    """Yield warnings on active tools never touched, and moulds from which the body moved away; collective.
-
-    A remeshed run has no findings.
-    """
+    """Yield warnings on tools never touched and moulds that the body left, but not of remeshed runs; collective."""
     segment = path.record.segments[-1]
     problem, states = segment.problem, segment.states
     if len(path.record.segments) > 1 or len(states) < 2:            # after remeshing the earlier states are missing
@@ -56,10 +53,7 @@ def untouched(path: Any) -> Iterator[Finding]:
 
 
 def _states_with_contact(path: Any, states: list[Any], name: str) -> list[Any]:
-    """Return the states in which to examine the contact of a tool, the most promising first.
-
-    The last state with a force comes first; states with touch follow.
-    """
+    """Return states to examine a tool's contact in: the last one with a force first, then those with touch."""
     column = Tooling.of_problem(path.problem).force_columns.get(name, "")
     forced = [state for state in states if state.measures.get(column)]
     touching = [state for state in states if state.measures.get("contact_length", state.measures.get("contact_area"))]

@@ -60,10 +60,7 @@ def new_axes() -> Any:
 
 
 def pyvista() -> Any:
-    """Return the module pyvista, imported without `matplotlib.pyplot`, which is slow to import.
-
-    pyvista needs pyplot only for charts; a placeholder module imports pyplot at its first use.
-    """
+    """Return pyvista without `matplotlib.pyplot`, slow to import and for charts only: a placeholder imports that."""
     name = "matplotlib.pyplot"
     if "pyvista" not in sys.modules and name not in sys.modules:
         sys.modules[name] = _LoadedWhenUsed(name)

@@ -78,10 +78,7 @@ class Admissible:
             self._gradients = gradients.reshape(n, -1, shapes.shape[2])            # (cells, points x 2, dofs)
 
     def minimum(self) -> WorstValue:
-        """Return the smallest hoop stretch or in-plane determinant, or the first that is not finite; collective.
-
-        It belongs to the current field, with its reference position.
-        """
+        """Return the field's smallest hoop stretch or in-plane determinant, or the first not finite; collective."""
         found = [WorstValue("in-plane determinant", np.inf, (0.0, 0.0))]
         for quantity, values in self.quantities().items():
             if values.size:

@@ -72,7 +72,4 @@ class ConstitutiveHistory(History, Protocol):
     rate_dependent: bool
 
     def forget_motion(self) -> None:
-        """Reset the internal variables that describe the motion in the last step (`Material.motion_variables`).
-
-        The time integration of the next step then assumes no earlier motion.
-        """
+        """Reset variables of motion in the last step (`Material.motion_variables`): the next assumes no earlier one."""

@@ -59,10 +59,7 @@ class MaterialHistory:
         self._terms.start.value = self._forms.time_at(control)
 
     def _values_at_end(self, cells: np.ndarray) -> dict[str, np.ndarray]:
-        """Return the internal variables at the end of the step in some cells.
-
-        The result is {name: values, shape (cells, points, components)}.
-        """
+        """Return {name: internal variable at the end of the step in some cells, (cells, points, components)}."""
         shape = len(cells), len(self._terms.places), sum(self._sizes.values())
         values = self._updated.eval(self._forms.domain, cells).reshape(shape) if len(cells) else np.zeros(shape)
         parts = np.split(values, np.cumsum(list(self._sizes.values()))[:-1], axis=2)
@@ -103,10 +100,7 @@ class MaterialHistory:
                 "values": {name: gathered(comm, v)[order] for name, v in variables.values.items()}}
 
     def load(self, data: dict[str, Any]) -> InternalVariables:
-        """Return the internal variables of this rank from data that `save` returned, such as those of a checkpoint.
-
-        Raise `InputError` if they belong to another mesh or another material.
-        """
+        """Return this rank's variables from data of `save`; another mesh or material is an InputError."""
         numbers, values = np.array(data.get("cells", []), dtype=np.int64), data.get("values", {})
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = {name: np.array(v, dtype=float) for name, v in values.items()}

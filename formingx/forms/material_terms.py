@@ -71,10 +71,7 @@ class MaterialTerms:
         return fem.Function(fem.functionspace(self.forms.domain, self.forms.rule.element(shape)))
 
     def position_coefficient(self, function: Any) -> fem.Function:
-        """Return a quadrature `Function` of f(R, Z), of the reference position on the first mesh of a run, length.
-
-        In a membrane, Z is the height halfway through the layer.
-        """
+        """Return a quadrature `Function` of f(R, Z) on the first mesh, length; in membranes Z halfway up the layer."""
         found, layer, brought = self.quadrature_function(), self.names[0], self.forms.scene.state_transfer
 
         def values(X: np.ndarray) -> np.ndarray:
@@ -103,10 +100,7 @@ class MaterialTerms:
             coefficient.update(temperatures)
 
     def mesh_coefficient(self, expression: Any) -> Any:
-        """Return a UFL scalar on the scene's mesh as a coefficient.
-
-        Raise `InputError` if the fields live on another mesh, such as the mid-surface of a membrane.
-        """
+        """Return a UFL scalar as coefficient; fields on another mesh, as a mid-surface, are an InputError."""
         if self.forms.domain is not self.forms.scene.mesh.domain:
             raise InputError(f"{self.material}: a membrane has its own mesh: give the constant as a function of"
                              f" (R, Z)")

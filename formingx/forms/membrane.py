@@ -191,10 +191,7 @@ class MidSurface(Formulation):
 
 
 def _faces(mesh: Mesh, layer: str, R: np.ndarray, near: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return lowest and highest Z of a layer at ascending R, shape (n,) each; (inf, -inf) where the layer is absent.
-
-    near: distance along R below which positions count as equal, length.
-    """
+    """Return lowest and highest Z of a layer at ascending R, (n,) each, equal within `near`; (inf, -inf) without."""
     cells = mesh.cells.find(mesh.layers[layer])
     nodes = cell_node_positions(mesh.domain, cells[cells < len(own_cells(mesh.domain))])
     edges = [(1, 2, 3), (0, 2, 4), (0, 1, 5)]                                  # ends, and the node between them

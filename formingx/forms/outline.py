@@ -62,10 +62,7 @@ class Outline:
         return gathered(self._forms.comm, np.isin(self._facets, self._forms.scene.mesh.facets_of(boundary)))
 
     def ordered(self, caller: str) -> list[int]:
-        """Return the edge numbers in order around the body, counterclockwise.
-
-        Raise `InputError` with the name of the caller if the body has a hole or several parts.
-        """
+        """Return the edge numbers counter-clockwise round a body of one part without holes, else an InputError."""
         after = {int(a): k for k, (a, _) in enumerate(self.ends)}
         order = [0]
         while len(order) < len(self.ends):

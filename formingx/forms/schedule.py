@@ -48,10 +48,7 @@ class StepData:
 
     @cached_property
     def controlled(self) -> int | None:
-        """Index in `rate` of the quantity that the control changes; None if nothing changes.
-
-        This is the process time if it changes, else the first item whose amplitude changes.
-        """
+        """Index in `rate` of the process time, if it changes, else of the first item that does; None for none."""
         if self.rate[-1]:
             return len(self.rate) - 1
         return next((i for i, rate in enumerate(self.rate) if rate), None)
@@ -66,10 +63,7 @@ class StepData:
         return self.base[number] + self.rate[number] * control
 
     def acting_amplitude(self, number: int, control: float) -> float:
-        """Return the amplitude of a load that acts on the body, 0 if inactive.
-
-        With `fading`, a new load is multiplied by the control, a removed one by 1 - control.
-        """
+        """Return the amplitude of an acting load, else 0; `fading`: a new one times control, an old one 1 - control."""
         share = float(number not in self.inactive)
         if self.fading and number in self.changed:
             share = control if share else 1 - control

@@ -86,10 +86,7 @@ class StepError:
         self._forms.clock += time - self._problem.time
 
     def _stresses_at(self, x: np.ndarray, time: float) -> list[np.ndarray]:
-        """Return the stresses of each material at the end of a step, shape (points, 4); x: shape (n,).
-
-        Entries 11, 22, sqrt(2) 12, 33 of the deviatoric Kirchhoff stress.
-        """
+        """Return for x, (n,), each material's deviatoric Kirchhoff stress, 11, 22, sqrt(2) 12, 33, (points, 4)."""
         self._set_time(time)
         self._problem.set_fields(x)
         return [stress.values() for stress in self._stresses]
@@ -101,20 +98,14 @@ class StepError:
         return self._stresses_at(x, time)
 
     def _advance(self, x: np.ndarray, control: float, time: float) -> None:
-        """Update the history variables of the materials to the unknowns x at a process time.
-
-        x: locally owned entries, shape (n,). control: load parameter (control) at this time, dimensionless.
-        """
+        """Update the materials' history variables to x, owned entries (n,), and control at a process time."""
         self._problem.set_fields(x)
         self._set_time(time)
         for history in self._materials:
             history.advance(x, control)
 
     def _norm(self, values: list[np.ndarray]) -> float:
-        """Return the root mean square of stresses over all quadrature points of all ranks.
-
-        values: stresses of each material, shape (points, 4).
-        """
+        """Return the root mean square of stresses of each material, (points, 4), over points of all ranks."""
         comm = self._problem.comm
         total, number = (combined(comm, v, MPI.SUM)
                          for v in (float(sum(np.sum(v**2) for v in values)), sum(v.shape[0] for v in values)))

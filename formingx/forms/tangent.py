@@ -125,10 +125,7 @@ class Tangent:
             self._by_motion = forms.compile(ufl.action(forms.tangent, self._lift))
 
     def enter(self, active: Any, rate: list[float], changed: bool) -> None:
-        """Set the active constraints, and the motion of driven supports, for new step data.
-
-        rate: `StepData.rate`. changed: True if the constraints differ from the current ones.
-        """
+        """Set active constraints and support motions, `StepData.rate`, of step data; changed: constraints differ."""
         if changed:
             self.matrix.constrain(active.bcs, active.rows)
         if self._lift is not None:
@@ -136,10 +133,7 @@ class Tangent:
             self._lift.x.array[active.dofs] = np.append(rate, 0.0)[active.driver]
 
     def by_control(self, rate: list[float], assemble: Callable[[Any], np.ndarray], n: int) -> np.ndarray:
-        """Return dF/dcontrol, shape (n,), through loads, time and driven supports, by rates `StepData.rate`.
-
-        `assemble` maps a compiled linear form to its n locally owned entries.
-        """
+        """Return dF/dcontrol (n,) through loads, time and supports; `assemble`: from forms to owned entries."""
         values = assemble(self._by_load) if self._by_load else np.zeros(n)
         if self._by_time and rate[-1]:
             values += assemble(self._by_time)

@@ -37,10 +37,7 @@ class TemperatureCoefficient:
         return self._values if self._rate is None else self._values * ufl.exp(self._rate * (time - self._since))
 
     def update(self, temperatures: Iterable[np.ndarray]) -> None:
-        """Update the coefficient to changed temperatures at quadrature points, else raise `InputError`.
-
-        temperatures: for each of `parts`, now and before, shape (1 or 2, cells, q).
-        """
+        """Update to temperatures of each of `parts`, now and before, (1 or 2, cells, q), else an InputError."""
         given = list(temperatures)
         key = self._temperature.time, self._temperature.time_before, *(T.tobytes() for T in given)
         known = self._known.pop(key, None)

@@ -99,10 +99,7 @@ def in_own_cells(domain: Any, expression: Any, where: np.ndarray) -> np.ndarray:
 
 
 def _shapes(barycentric: np.ndarray) -> np.ndarray:
-    """Return the seven shape functions of a quadratic triangle with a bubble, shape (..., 7).
-
-    They belong to corners, opposite midpoints and centroid; barycentric: shape (..., 3).
-    """
+    """Return the seven shape functions of corners, opposite midpoints and centroid at barycentric (..., 3)."""
     a, b, c = np.moveaxis(barycentric, -1, 0)
     bubble = 27 * a * b * c
     corners = [s * (2 * s - 1) + bubble / 9 for s in (a, b, c)]
@@ -160,10 +157,7 @@ def _matrices(entries: np.ndarray) -> np.ndarray:
 
 
 def isochoric_gradients(forms: Any, cells: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return F without thermal expansion, scaled to det F = 1, shape (cells q, 3, 3); collective.
-
-    places: positions in the reference cell, shape (q, dimension).
-    """
+    """Return F without expansion, det F = 1, (cells q, 3, 3), at places (q, dimension) of cells; collective."""
     F = forms.elastic_F
     expression = _compat.compile_expression(ufl.as_vector([F[i, j] for i in range(3) for j in range(3)]), places)
     found = (expression.eval(forms.domain, cells) if len(cells) else np.zeros(0)).reshape(-1, 3, 3)

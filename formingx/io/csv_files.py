@@ -59,10 +59,7 @@ class CsvTable(NamedTuple):
 
 
 def conversion(unit: str, requested: str) -> float:
-    """Return the factor that converts numbers from one unit to another, for example 10 from "cm" to "mm".
-
-    An unknown unit, or units of different quantities, are an InputError.
-    """
+    """Return the factor from one unit to another, such as 10 from "cm" to "mm"; an impossible one is an InputError."""
     if unit == requested:
         return 1.0
     for sizes in UNITS.values():
@@ -141,10 +138,7 @@ def records(file: Any) -> list[tuple[int, list[str]]]:
 
 
 def _decoded(content: bytes) -> str:
-    """Return the bytes of a file as text: UTF-16 with its mark or with many zero bytes, UTF-8, or else Windows-1252.
-
-    Other bytes raise a UnicodeDecodeError.
-    """
+    """Return bytes as text: UTF-16 by mark or zeros, UTF-8, or Windows-1252; others are a UnicodeDecodeError."""
     if content[:2] in (b"\xff\xfe", b"\xfe\xff"):
         return content.decode("utf-16")
     if content[1:400:2].count(0) > len(content[1:400:2]) / 2:

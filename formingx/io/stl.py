@@ -22,10 +22,7 @@ def volume(points: np.ndarray, triangles: np.ndarray) -> float:
 
 
 def write_stl(points: np.ndarray, triangles: np.ndarray, file: Any) -> None:
-    """Write points (n, 3), length, and triangles (m, 3), counter-clockwise seen from outside, as binary STL.
-
-    A failed file is an OSError.
-    """
+    """Write points (n, 3), length, and outward triangles (m, 3), as binary STL; a failed file is an OSError."""
     corners = points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)

@@ -196,10 +196,7 @@ class OfMesh(Varying):
 
 
 def varying(value: Any) -> Varying | None:
-    """Return a constant as an object of `Varying`; None for a number.
-
-    It may be a function f(R, Z), a UFL expression, or a `table` over the temperature.
-    """
+    """Return f(R, Z), a UFL expression or a `table` over the temperature as a `Varying`; None for a number."""
     if isinstance(value, Varying):
         return value
     if isinstance(value, ufl.core.expr.Expr):

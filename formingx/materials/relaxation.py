@@ -19,10 +19,7 @@ def checked_shift(name: str, shift: Any) -> Callable:
 
 
 def checked_pairs(name: str, pairs: Any, what: str) -> list[list[Any]]:
-    """Return pairs of constants, such as moduli and relaxation times, as lists.
-
-    An empty list, or an entry that is no pair, is an InputError with `what`.
-    """
+    """Return pairs of constants as lists; none, or an entry that is no pair, is an InputError with `what`."""
     found = as_list(name, pairs, f"({what})")
     if not found:
         raise InputError(f"{name} = {pairs!r}: must be at least one ({what})")

@@ -30,10 +30,7 @@ def tool_factor(scene: Any, contact: Any) -> int:
 
 
 def support_factor(scene: Any, support: Any) -> int:
-    """Return the force on a whole driven support over that on its part in the model.
-
-    It is a power of 2, and 1 if no mirror plane cuts the support (`MirrorPlanes.factor_of`).
-    """
+    """Return whole over modelled force of a driven support, a power of 2 (`MirrorPlanes.factor_of`)."""
     (constraint,) = scene.kinematics.in_axes(support, support.constraints())
     nodes = scene.first.mesh.nodes_of(constraint.on)
     return int(scene.symmetry.factor_of(np.stack([nodes.min(0), nodes.max(0)]),

@@ -117,10 +117,7 @@ class ElasticStretches:
             self._to_places = at_places @ np.linalg.pinv(root * basis) * root.T      # least squares: an L2 projection
 
     def evaluate(self, cells: int) -> np.ndarray:
-        """Return the stretches in the present fields, (cells, n, branches); nan for a missing branch.
-
-        Cells are owned ones, and branches the largest number (`count`).
-        """
+        """Return present stretches in owned cells, (cells, n, `count`); nan for a missing branch."""
         found = np.full((cells, self._n, self.count), np.nan)
         for expression, own, count in self._parts:
             if len(own):

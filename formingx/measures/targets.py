@@ -38,10 +38,7 @@ class Amplitude(Quantity):
         return self._number is None or self._problem.setting.rate[self._number] != 0
 
     def _amplitude(self, control: float) -> float:
-        """Return this pressure, travel or time over its scale, at a value of the control.
-
-        The scale of the process time and of the control is 1.
-        """
+        """Return this pressure, travel or time over its scale, which is 1 for time and control, at a control."""
         if self._number == -1:
             return self._problem.forms.time_at(control)
         if self._number is None:
@@ -350,10 +347,7 @@ def _displacement(problem, points, factors):
 
 
 def _pole(problem):
-    """Return the lowest and the highest Z on the axis, on the first mesh, length.
-
-    A mesh without a boundary "axis" is an InputError.
-    """
+    """Return lowest and highest Z on the "axis" of the first mesh, length; without one, an InputError."""
     mesh = problem.scene.first.mesh
     if "axis" not in mesh.boundaries:
         raise InputError(f"the pole needs a boundary named 'axis'; the mesh has {list(mesh.boundaries)}: elsewhere take"

@@ -12,10 +12,7 @@ _CHUNK = 2**18      # pairs that are compared at a time
 
 
 def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield indices i and j, (k,) each, of boxes that overlap or touch, every pair once.
-
-    The lower and upper corners are finite, shape (n, 2).
-    """
+    """Yield i and j, (k,) each, of boxes with finite corners (n, 2) that overlap or touch, every pair once."""
     if len(low)**2 <= MAX_COMPARED:
         pairs, count = np.empty((0, 2), dtype=int), 8 * len(low)
         while len(pairs) < count:

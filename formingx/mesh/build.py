@@ -128,10 +128,7 @@ def _with_preset(mesh: Mesh, accuracy: str, layers: Mapping[str, Callable], coor
 
 
 def _checked_sizes(concentrate: Mapping[float, float], low: float, high: float) -> dict[float, float]:
-    """Return the argument {radius: relative size} `concentrate` of `disc`, checked and sorted by radius.
-
-    A radius that is not on the disc, or a size not between 1e-6 and 1, is an InputError.
-    """
+    """Return {radius: relative size} sorted; radii off the disc, or sizes not from 1e-6 to 1: InputError."""
     if not isinstance(concentrate, Mapping) or not concentrate:
         raise InputError(f"disc: concentrate = {concentrate!r}: must be {{reference radius: relative size}}")
     sizes = {}

@@ -52,10 +52,7 @@ def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def connected_pieces(triangles: np.ndarray) -> np.ndarray:
-    """Return a number for each triangle that is equal within a connected piece of the body, shape (m,).
-
-    triangles: node numbers of the corners, shape (m, 3). The number is 0 for the piece with the lowest node number.
-    """
+    """Return the number of the connected piece of each triangle (m, 3), shape (m,), 0 for the lowest node."""
     nodes, corners = np.unique(triangles, return_inverse=True)
     corners, piece = corners.reshape(-1, 3), np.arange(len(nodes))
     while True:
@@ -88,10 +85,7 @@ def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None
 
 
 def inverted(nodes: np.ndarray) -> np.ndarray:
-    """Return a mask (m,) of triangles (m, 3 or 6, 2) whose Jacobian vanishes at a node or changes sign.
-
-    Triangles of three nodes have False.
-    """
+    """Return the mask (m,) of triangles (m, 6, 2) whose Jacobian vanishes or changes sign; (m, 3, 2): False."""
     if nodes.shape[1] != 6:
         return np.zeros(len(nodes), dtype=bool)
     a, b, c, ab, bc, ac = (nodes[:, i] for i in range(6))
@@ -129,10 +123,7 @@ def crossing_point(points: np.ndarray, edges: np.ndarray) -> np.ndarray | None:
 
 
 def crossing_edges(points: np.ndarray, edges: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield the indices of edges that cross, or touch anywhere but in a common node, (m, 2), m > 0.
-
-    Ends of edges have shape (n, 2), length, edges their rows (k, 2).
-    """
+    """Yield pairs (m, 2), m > 0, of edges (k, 2) of points (n, 2), length, that cross or touch off a common node."""
     low, high = points[edges].min(1), points[edges].max(1)
     tolerance = ROUND_OFF * float((high - low).max())
     for first, second in overlapping(low - tolerance, high + tolerance):

@@ -52,10 +52,7 @@ def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray
 
 
 def _call(function: Callable, v: float, caller: str, coordinate: str) -> Any:
-    """Return the thickness by a user's function at coordinate `v`.
-
-    An error in it is an InputError that names the thickness and the coordinate.
-    """
+    """Return the thickness by a user's function at `v`; its error is an InputError with the coordinate."""
     try:
         return function(v)
     except Exception as error:
@@ -64,10 +61,7 @@ def _call(function: Callable, v: float, caller: str, coordinate: str) -> Any:
 
 
 def checked_grading(kind: str, grading: Any) -> float:
-    """Return the size of the last over the first element as a float.
-
-    It must lie between 1e-6 and 1e6, otherwise an InputError says so.
-    """
+    """Return the size of the last over the first element as a float from 1e-6 to 1e6, else an InputError."""
     grading = positive(f"{kind}: grading", grading)
     if not 1e-6 <= grading <= 1e6:
         raise InputError(f"{kind}: grading = {grading!r}: must be from 1e-6 to 1e6")
@@ -96,10 +90,7 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
 
 
 def _layer_ends(kind: str, given: Any) -> np.ndarray:
-    """Return the ends of the n elements through a layer on [0, 1], shape (n + 1,).
-
-    `given` is their number or relative sizes, which must be positive.
-    """
+    """Return the ends (n + 1,) of elements through a layer on [0, 1] by number or positive relative sizes."""
     if not is_sequence(given):
         n = count(f"{kind}: elements through a layer", given)
         if n > MAX_RECTANGLES:
@@ -136,10 +127,7 @@ def with_middles(joints: np.ndarray) -> np.ndarray:
 
 
 def levels(layers: Mapping[str, Callable], through: list[np.ndarray], coordinates: np.ndarray) -> np.ndarray:
-    """Return the distances of all rows of nodes from the first face of a sheet, shape (rows, n), length.
-
-    Rows lie at the ends and middles of elements; coordinates have shape (n,).
-    """
+    """Return distances (rows, n), length, of rows at ends and middles of elements from the first face."""
     rows = [np.zeros(len(coordinates))]
     for thickness_at, ends in zip(layers.values(), through):
         h, base = thickness_at(coordinates), rows[-1]

@@ -133,10 +133,7 @@ def fillets_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool, moving: bo
 
 
 def flats_in_sheet(tool: Any, face: np.ndarray, axisymmetric: bool) -> FlatsInSheet:
-    """Return the points of a sheet that may touch the straight pieces of a fixed section tool.
-
-    The undeformed face has points (R, Z), shape (n, 2), length.
-    """
+    """Return the points of an undeformed face (n, 2), length, that may touch a fixed tool's straight pieces."""
     found = _touched(tool, face)
     straight = np.flatnonzero(found.curvature == 0)
     stretches = [found.stretches(axisymmetric, np.arange(max(k - 1, 0), min(k + 2, len(found.points))))
@@ -177,10 +174,7 @@ def _surface(tool: Any, face: np.ndarray, length: float) -> tuple[np.ndarray, np
 
 
 def _groups(curvature: np.ndarray) -> list[np.ndarray]:
-    """Return the indices of the points on each arc of a tool: consecutive points of equal curvature above 0. curvature:
-
-    absolute curvature at each point of the tool, shape (m,), 1/length.
-    """
+    """Return the indices of points on each arc: consecutive ones of equal curvature (m,) above 0, 1/length."""
     if not len(curvature):
         return []
     same = np.isclose(curvature[1:], curvature[:-1], rtol=1e-3)

@@ -94,10 +94,7 @@ def gathered(mesh: Mesh) -> Grid:
 
 
 def to_mesh(make: Callable[[], Grid], comm: MPI.Comm, what: str) -> Mesh:
-    """Return the distributed mesh of the grid that `make` returns on rank 0; collective.
-
-    Invalid elements, or its own InputError, raise an InputError on all ranks, with the name `what`.
-    """
+    """Return the distributed mesh of `make`'s grid on rank 0; an InputError is raised on all ranks; collective."""
     error, shape = None, None
     if comm.rank == 0:
         try:
@@ -158,10 +155,7 @@ def _tagged(grid: Grid, what: str) -> tuple:
 
 
 def _edges(triangles: np.ndarray) -> dict[tuple[int, int], list[int]]:
-    """Return {(lower, higher node number of the ends): [node number of the middle]} of all edges of triangles.
-
-    The list is empty for triangles of three nodes.
-    """
+    """Return {(lower, higher end node): [middle node], [] for three-node triangles} of all edges of triangles."""
     found: dict[tuple[int, int], list[int]] = {}
     for i, j, k in _EDGES:
         ends = np.sort(triangles[:, [i, j]], axis=1).tolist()

@@ -60,10 +60,7 @@ class Content(NamedTuple):
 
 
 def content(file: str | os.PathLike) -> Content:
-    """Return nodes, elements and names of a gmsh file (MSH 2.2 or 4.1, text or binary).
-
-    An InputError names the section of an unreadable file.
-    """
+    """Return nodes, elements and names of MSH 2.2 or 4.1, text or binary; InputError: unreadable section."""
     file = os.fspath(file)
     try:
         with open(file, "rb") as stream:
@@ -187,10 +184,7 @@ def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray,
 
 
 def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
-    """Yield the names and contents of the sections of a file with the content `data`.
-
-    A section without end, or content outside, is an InputError.
-    """
+    """Yield names and contents of a file's sections; one without end, or content outside, is an InputError."""
     begin, offset = re.compile(rb"\s*\$(\w{1,40})[ \t]*\r?\n"), 0
     while match := begin.match(data, offset):
         end = data.find(b"$End" + match[1], match.end())
@@ -222,10 +216,7 @@ def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
 
 
 def _names(body: bytes, file: str) -> dict[tuple[int, int], str]:
-    """Return {(dimension, number of a group): name} from the section $PhysicalNames.
-
-    A line of another form, or a group with two names, is an InputError.
-    """
+    """Return {(dimension, group): name} from $PhysicalNames; another form or a second name is an InputError."""
     lines = [line for line in body.decode("utf-8", "replace").splitlines() if line.strip()]
     names: dict[tuple[int, int], str] = {}
     if lines and lines[0].strip() != str(len(lines) - 1):
@@ -255,10 +246,7 @@ def _nodes_2(section: Section) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _elements_2(section: Section) -> list[Block]:
-    """Return a block for each (element type, group, entity) from the section $Elements of an MSH 2.2 file.
-
-    An unknown element type is an InputError.
-    """
+    """Return a block for each (type, group, entity) of MSH 2.2's $Elements; an unknown type is an InputError."""
     found: dict[tuple[int, int, int], list] = {}
     n, done = section.line() if section.binary else checked_count(section.ints(1), section), 0
     while done < n:
@@ -327,10 +315,7 @@ def _check_total(section: Section, what: str, total: int, parts: list[np.ndarray
 
 
 def _elements_4(section: Section, groups: dict[tuple[int, int], tuple[int, ...]]) -> list[Block]:
-    """Return the blocks of elements from the section $Elements of an MSH 4.1 file.
-
-    Groups are {(dimension, entity): numbers of physical groups}; an unknown element type is an InputError.
-    """
+    """Return blocks of MSH 4.1's $Elements in {(dimension, entity): groups}; an unknown type is an InputError."""
     blocks = []
     number, total, *_ = section.sizes(4)
     for _ in range(checked_count([number], section)):

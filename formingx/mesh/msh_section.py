@@ -31,10 +31,7 @@ class Section:
         return self._binary
 
     def line(self) -> int:
-        """Return the count on the next line, which begins a section of a binary MSH 2.2 file.
-
-        A missing line is an InputError.
-        """
+        """Return the count on the next line, at the start of a binary MSH 2.2 section, else an InputError."""
         end = self._body.find(b"\n", self._offset)
         word = self._body[self._offset:end].strip()
         if end < 0 or not word.isdigit() or len(word) > 15:
@@ -70,10 +67,7 @@ class Section:
         return self._bytes(n, np.dtype([(name, self._order + kind, shape) for name, kind, shape in fields]))
 
     def _take(self, n: int, kind: str) -> np.ndarray:
-        """Return the next n numbers of a type, such as "f8", shape (n,); in text files all numbers are floats.
-
-        A section that is too short is an InputError.
-        """
+        """Return the next n numbers of a type, such as "f8", (n,), floats in text; too few are an InputError."""
         if self._binary:
             return self._bytes(n, np.dtype(self._order + kind))
         if n > len(self._values) - self._offset:
@@ -82,10 +76,7 @@ class Section:
         return self._values[self._offset - n:self._offset]
 
     def _bytes(self, n: int, kind: np.dtype) -> np.ndarray:
-        """Return the next n numbers or records of a type in a binary section, shape (n,).
-
-        A section that is too short is an InputError.
-        """
+        """Return the next n binary numbers or records of a type, (n,); too short a section is an InputError."""
         if n * kind.itemsize > len(self._body) - self._offset:
             raise InputError(f"{self.where}: ends too early: {n} more numbers must follow")
         found = np.frombuffer(self._body, kind, n, self._offset)

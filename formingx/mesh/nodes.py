@@ -77,10 +77,7 @@ def without_round_off(point: Any, points: Any) -> tuple[float, ...]:
 
 
 def matching_rows(points: np.ndarray, stored: Any, tolerance: float, message: str) -> np.ndarray:
-    """Return the row of stored positions (m, d) that coincides with each point (n, d), shape (n,).
-
-    A point farther than `tolerance`, length, from all of them is an InputError with the message.
-    """
+    """Return the row of stored positions (m, d) at each point (n, d), (n,); beyond `tolerance`: InputError."""
     stored = np.reshape(stored, (-1, points.shape[-1]))
     if not len(points):                                      # a rank without such points
         return np.zeros(0, dtype=int)

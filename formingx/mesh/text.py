@@ -60,10 +60,7 @@ def write(grid: Grid, file: str | os.PathLike, numbering: str = "corners") -> No
 
 
 def read(file: str | os.PathLike) -> Grid:
-    """Return the grid in a text file of `write`; clockwise elements become counter-clockwise.
-
-    A missing file, or another format than "six-node triangles", is an InputError with the line.
-    """
+    """Return the grid in a file of `write`, made counter-clockwise; another format is an InputError with the line."""
     lines = _Lines(os.fspath(file))
     *first, version = next(lines, None) or [""]
     if " ".join(first) != _FORMAT or version not in _VERSIONS:
@@ -113,10 +110,7 @@ def read(file: str | os.PathLike) -> Grid:
 
 
 def _check_edges(file: str, layers: dict, boundaries: dict, numbers: np.ndarray) -> None:
-    """Raise an InputError unless every boundary edge (k, 3) is an edge of an element (m, 6).
-
-    The node `numbers` of the file, (n,), are for messages.
-    """
+    """Raise an InputError, with node `numbers`, unless boundary edges (k, 3) belong to elements (m, 6)."""
     edges = {(frozenset(row[[i, j]].tolist()), int(row[k])) for triangles in layers.values() for row in triangles
              for i, j, k in ((0, 1, 3), (1, 2, 4), (2, 0, 5))}
     for name, rows in boundaries.items():

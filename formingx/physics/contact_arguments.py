@@ -34,10 +34,7 @@ def coefficient(name: str, friction: Any) -> Any:
 
 
 def closures(name: str, nodes: Any) -> int | float | None:
-    """Return `nodes_per_step`: None, a number of nodes from 1, or a share of the nodes of the face below 1.
-
-    Another value is an InputError.
-    """
+    """Return `nodes_per_step`, None, a number from 1 or a share below 1 of a face's nodes, else an InputError."""
     if nodes is None:
         return None
     return float(nodes) if positive(name, nodes) < 1 else count(name, nodes)

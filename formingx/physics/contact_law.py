@@ -634,10 +634,7 @@ class Law(NormalLaw):
         return turned + np.where(out[4 * n:5 * n] == 0, out[11 * n:], 0.0)           # where points do not slide
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
-        """Return distances and elastic slips at x, shape (n, 2), length, with their gradients, shape (n, 2).
-
-        Slips are 0 without history.
-        """
+        """Return distances and slips (0 without history) at x, with gradients, shape (n, 2), length."""
         near = self.nearest(x)
         g, dg = (np.zeros(len(x)), 0 * x) if old is None else self._slip(x, near, old)
         return Motion(x, near.distance, near.normal, g, dg)

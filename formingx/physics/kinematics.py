@@ -291,10 +291,7 @@ def volume_ratio(F):
 
 
 def is_block(F):
-    """Return True if the entries 13, 23, 31 and 32 of F are zero by construction, as in a section.
-
-    They are expressions in the F of a non-axisymmetric mode.
-    """
+    """Return True if F has no entries 13, 23, 31 and 32, which only non-axisymmetric modes add."""
     across = ((0, 2), (1, 2), (2, 0), (2, 1))
     return not isinstance(F, ListTensor) or all(isinstance(F[place], Zero) for place in across)
 

@@ -234,10 +234,7 @@ class PrescribedDisplacement(_OneComponent):
 
 
 def _component(name: str, value: str) -> int:
-    """Return the number of a displacement component with the name `value`: 0 for "r", 1 for "z", 2 for "y", 3 for "x".
-
-    Another name raises an InputError, whose message begins with `name`.
-    """
+    """Return 0 for "r", 1 for "z", 2 for "y", 3 for "x"; another component is an InputError with `name`."""
     if not isinstance(value, str) or value not in NAMES:
         raise InputError(f"{name} = {value!r}: must be 'r' or 'z' (in three dimensions 'x', 'y' or 'z')")
     return NAMES.index(value)

@@ -68,10 +68,7 @@ class PartNumbers(KeyNumbers):
         return "weight" + ", lengths taken for cm" * (not self.units.length)
 
     def _rows(self, where: str, further: list[tuple[str, str]]) -> list[tuple[str, str]]:
-        """Return the rows (name, value with unit) of the printed table, `further` ones before that of the scrap.
-
-        `where` is the place of the minimum wall.
-        """
+        """Return rows (name, value with unit) with `further` ones before the scrap; where: place of the minimum."""
         rows = [("given for", self.basis)] if self.basis else []
         if self.weight is not None:
             rows += [(self.weight_label, self._with_unit(self.weight, self.units.weight))]

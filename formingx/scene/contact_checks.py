@@ -61,10 +61,7 @@ def check_start(scene: Any, contact: Contact) -> None:
 
 
 def _fits_upside_down(contact: Contact, face: np.ndarray, points: np.ndarray, near: float) -> bool:
-    """Return True if the tool, mirrored and moved along Z to touch a face (m, 2), is free of the body (n, 2).
-
-    `near` is the round-off of a length.
-    """
+    """Return True if a tool mirrored in Z, at the face (m, 2), is free of the body (n, 2) up to `near`, length."""
     tool = contact.tool.mirrored()
     low, high = tool.bounds[:, 1]
     below = tool.moved(z=face[:, 1].min() - high)

@@ -362,10 +362,7 @@ class Scene:
 
 
 def _checked_items(kind: type, name: str, scene_items: Any, what: str) -> list[Any]:
-    """Return an argument as a list; raise an InputError unless all entries are objects of the class `kind`.
-
-    `name` is the name of the argument, `what` describes its entries in the message.
-    """
+    """Return an argument, named `name`, as a list of objects of `kind`, described by `what`, else an InputError."""
     scene_items = as_list(f"Scene: {name}", scene_items, what)
     for item in scene_items:
         if not isinstance(item, kind):

@@ -24,20 +24,14 @@ def check_driven(supports: Sequence[Any]) -> None:
 
 
 def check_held(scene: Any, supports: Sequence[Any], touched: bool = False) -> None:
-    """Raise an InputError unless the active supports constrain u_r on the axis and prevent rigid motions of the body.
-
-    touched: True if a tool may prevent rigid motions; then only the axis is checked.
-    """
+    """Raise an InputError unless supports constrain u_r on the axis and, without touch of a tool, rigid motions."""
     check_axis(scene, supports)
     if not touched:
         check_rigid_body(scene, supports)
 
 
 def check_axis(scene: Any, supports: Sequence[Any]) -> None:
-    """Check that an axisymmetric mesh does not cross the axis R = 0, and that a support constrains u_r on it.
-
-    A violation is an InputError.
-    """
+    """Raise an InputError if an axisymmetric mesh crosses the axis, or no support constrains u_r on it."""
     if not scene.kinematics.axisymmetric:
         return
     geometry = scene.mesh.domain.geometry

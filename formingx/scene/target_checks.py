@@ -78,10 +78,7 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
 
 
 def implausible(scene: Scene, quantity: str | None, value: float) -> str | None:
-    """Return the reason why a "pressure" or "travel" is implausibly large for a scene, or None.
-
-    It is above 1e9 times the shear modulus, or the extent of the body.
-    """
+    """Return why a "pressure" or "travel" is over 1e9 shear moduli or extents of a scene, or None."""
     if quantity == "pressure":
         what, unit = "the shear modulus", max([scene.shear_modulus(name) for name in scene.mesh.layers])
     elif quantity == "travel":
@@ -103,10 +100,7 @@ def _is_plate(contact: Any) -> bool:
 
 
 def _meets_flat_sheet_alone(scene: Scene, contact: Any) -> bool:
-    """Return True if a tool that moves along Z is the only load of a flat sheet without a hole.
-
-    The sheet is then free of stress at the beginning, and resists the tool at each travel.
-    """
+    """Return True if a tool along Z alone loads a flat sheet without a hole, which resists at each travel."""
     tool = scene.same_tool(scene.items.index(contact))
     others = [item for i, item in enumerate(scene.items) if item.driven and i not in tool]
     if scene.loads or others or scene.heat is not None or scene.expansion or scene.state_transfer is not None:
@@ -118,10 +112,7 @@ def _meets_flat_sheet_alone(scene: Scene, contact: Any) -> bool:
 
 
 def _constraining_support(scene: Scene, name: str, supports: list[Any]) -> Any:
-    """Return the support that constrains the displacement of a target to a constant, or None.
-
-    `name` is the name of the target, such as "u_r_at_1_0.5" for u_r at (R, Z) = (1, 0.5).
-    """
+    """Return the support that holds the displacement of a target, such as "u_r_at_1_0.5", or None."""
     component, place = name.removeprefix("u_").split("_at_")
     point, near = np.array([float(x) for x in place.split("_")]), SAME_PLACE * max(scene.extent)
     for support in supports:

@@ -46,10 +46,7 @@ def arcs_along(curve: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tol
 
 
 def in_plane(points: np.ndarray, name: str) -> np.ndarray:
-    """Return the coordinates (x, y), shape (n, 2), of points (n, 3) in the plane z = 0, length.
-
-    A point outside the plane is an InputError, which begins with `name`.
-    """
+    """Return (x, y) of points (n, 3) in the plane z = 0, length; another point is an InputError with `name`."""
     points = np.asarray(points, dtype=float).reshape(-1, 3)
     outside = ~(np.abs(points[:, 2]) <= 1e-9 * max(np.abs(points[:, :2]).max(initial=0.0), 1e-300))
     if np.any(outside):

@@ -38,10 +38,7 @@ def curves(file: str, kind: str, tolerance: float | None) -> dict[int, Callable[
 
 
 class _Reader:
-    """Reader of one "step" or "brep" file in a separate process, which ends with the `with` block.
-
-    bounds: {number of a curve: [lowest, highest value of its curve parameter]}.
-    """
+    """Reader of a "step" or "brep" file in a process for a `with` block; bounds: {curve: [low, high parameter]}."""
 
     def __init__(self, file: str, kind: str):
         self._file, self._seconds = file, _BASE_SECONDS + os.path.getsize(file) // _BYTES_PER_SECOND
@@ -125,10 +122,7 @@ def _raise(error: InputError) -> list[Line | Arc]:
 
 
 def _check_references(file: str) -> None:
-    """Raise an InputError unless a STEP file has its end, and defines every referenced item once.
-
-    The reader would leave out such parts without an error.
-    """
+    """Raise an InputError unless a STEP file is whole, with all items once: readers leave parts out silently."""
     text = re.sub(r"'[^']*'|/\*.*?\*/", "", Path(file).read_bytes().decode("latin-1"), flags=re.DOTALL)
     if "END-ISO-10303-21" not in text:
         raise InputError(f"tool file {file!r} cannot be read: it has no end: it was cut off")

@@ -62,10 +62,7 @@ def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]
 
 
 def _read(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the lines and arcs of a DXF entity, made by the function for its kind.
-
-    An unsupported kind, or a curve in another plane, is an InputError.
-    """
+    """Return lines and arcs of a DXF entity by its kind; other kinds and planes are an InputError."""
     kind = entity.dxftype()
     if kind in _SKIPPED:
         raise InputError(f"{name} is a {kind}, which is no curve of a section: draw it as lines, arcs, polylines or"
@@ -123,10 +120,7 @@ def _polyline(entity: Any, tolerance: float | None, name: str) -> list[Line | Ar
 
 
 def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along a DXF ellipse; their largest distance from it is `tolerance`, length.
-
-    No tolerance, or a ratio of axes not between 0 and 1, is an InputError.
-    """
+    """Return arcs within `tolerance`, length, of a DXF ellipse; none, or a bad ratio of axes, is an InputError."""
     _in_plane(entity.dxf.center, name), _in_plane(entity.dxf.major_axis, name)
     if not 0 < entity.dxf.ratio <= 1:
         raise InputError(f"{name}: its axes have the ratio {entity.dxf.ratio:g}: must be above 0, at most 1")
@@ -141,10 +135,7 @@ def _ellipse(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc
 
 
 def _spline(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return arcs along the smooth parts of a DXF spline between its knots, up to a distance, length.
-
-    No tolerance, or a point outside the plane, is an InputError.
-    """
+    """Return arcs within a tolerance, length, of the smooth parts of a plane DXF spline, else an InputError."""
     for point in (*entity.control_points, *entity.fit_points):
         _in_plane(point, name)
     tool = entity.construction_tool()
@@ -172,10 +163,7 @@ def _is_visible(entity: Any, drawing: Any) -> bool:
 
 
 def unit(file: str) -> str | None:
-    """Return the name of the unit of length that a DXF file states ($INSUNITS), or None.
-
-    An unreadable file, or another unit, is an InputError.
-    """
+    """Return the unit of length of a DXF file ($INSUNITS), or None; unreadable or unknown: InputError."""
     import ezdxf
     try:
         code = ezdxf.readfile(file).header.get("$INSUNITS", 0)

@@ -87,10 +87,7 @@ def read(file: str | os.PathLike, curves: Sequence[int] | None = None, closed: b
 
 
 def _outside_body(tool: Tool, body: Any, file: str) -> Tool:
-    """Return the tool, or the tool with its solid on the other side, so that a point or mesh lies outside.
-
-    A body on both sides of the profile is an InputError.
-    """
+    """Return the tool, reversed if a point or mesh lies inside; a body on both sides is an InputError."""
     if hasattr(body, "nodes_of"):
         points = np.concatenate([body.nodes_of(name) for name in body.boundaries])
     else:
@@ -160,10 +157,7 @@ def _tag(tag: Any) -> int:
 
 
 def _factor(units: Any, kind: str, file: str) -> float:
-    """Return the factor by which the lengths of a file are multiplied.
-
-    An unknown unit, or none in the file, is an InputError.
-    """
+    """Return the factor of a file's lengths; an unknown unit, or none in the file, is an InputError."""
     units = units.length if isinstance(units, Units) else units
     if not isinstance(units, str):
         return positive("tools.read: units (of length, or a factor)", units)
@@ -181,10 +175,7 @@ def _scaled(piece: Line | Arc, factor: float) -> Line | Arc:
 
 
 def _geo_curves(file: str) -> _Curves:
-    """Return {number of a curve: function that returns its line or arc in a list} for a .geo file.
-
-    The function raises an InputError for other curves.
-    """
+    """Return {curve: function that returns [its line or arc]} of a .geo file, or raises an InputError."""
     def pieces(tag: int, piece: Line | Arc | str) -> list[Line | Arc]:
         if isinstance(piece, str):
             raise InputError(f"tool file {file!r}: curve {tag} is a {piece}, which is read from no .geo file: export it"

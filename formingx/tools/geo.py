@@ -35,10 +35,7 @@ _ALLOWED = ("points, lines, circles, loops, surfaces, physical groups, mesh size
 
 
 def curves(file: str | os.PathLike) -> dict[int, Line | Arc | str]:
-    """Return {number of a curve: line, arc, or kind of another curve, such as "Spline"} of a .geo file.
-
-    An unreadable file, or an unsupported statement, is an InputError with the line.
-    """
+    """Return {curve: line, arc, or kind, as "Spline"} of a .geo file; what it cannot read is an InputError."""
     file = os.fspath(file)
     try:
         with open(file, encoding="utf-8") as stream:
@@ -71,10 +68,7 @@ class _Drawing:
         self.curves: dict[int, Line | Arc | str] = {}
 
     def add(self, statement: str) -> None:
-        """Add the point, curve or named number that one statement of the gmsh script defines.
-
-        An unsupported statement is a ValueError.
-        """
+        """Add the point, curve or named number of a gmsh statement; an unsupported one is a ValueError."""
         if entity := _ENTITY.fullmatch(statement):
             kind, tag, numbers = entity[1], self._number(entity[2]), [self._number(n) for n in entity[3].split(",")]
             if kind in ("Point", "Line", "Circle"):
@@ -90,10 +84,7 @@ class _Drawing:
             self.values[name.strip()] = self._number(value)
 
     def _add_point(self, tag: int, numbers: list[float]) -> None:
-        """Add point `tag` at (x, y, 0[, mesh size]), length.
-
-        A point outside the plane, or with a used number, is a ValueError.
-        """
+        """Add point `tag` at (x, y, 0[, mesh size]), length; another plane or a used number is a ValueError."""
         if len(numbers) not in (3, 4) or numbers[2] != 0 or not all(map(math.isfinite, numbers)):
             raise ValueError("a point must be {x, y, 0} or {x, y, 0, mesh size}, finite numbers")
         if tag in self.points:
@@ -148,10 +139,7 @@ class _Drawing:
         return int(number)
 
     def _number(self, text: str) -> float:
-        """Return the value of an expression of numbers, names, functions and + - * / ^.
-
-        Anything else is a ValueError.
-        """
+        """Return the value of numbers, names, functions and + - * / ^; anything else is a ValueError."""
         words = re.findall(r"(?<![\w.])[0-9.][\w.]*", text)            # Python takes 1_0, 0x10 and 1j for numbers
         if len(text) > 1000 or "**" in text or not re.fullmatch(r"[\w\s.+\-*/^()]*", text, re.ASCII) or not all(
                 is_number(word.removesuffix("e").removesuffix("E")) for word in words):
@@ -159,10 +147,7 @@ class _Drawing:
         return float(self._value(ast.parse(text.strip().replace("^", "**"), mode="eval").body))
 
     def _value(self, node: ast.expr) -> float:
-        """Return the value of a node of the syntax tree of an expression.
-
-        A node that is not a number, a known name or an operation is a ValueError.
-        """
+        """Return the value of a syntax node: a number, known name or operation; another is a ValueError."""
         if isinstance(node, ast.Constant) and isinstance(node.value, int | float) and not isinstance(node.value, bool):
             return float(node.value)
         if isinstance(node, ast.Name) and node.id in self.values:

@@ -203,10 +203,7 @@ def _check_fit(points: np.ndarray, radii: list[float], lengths: dict, cut: list[
 
 
 def checked(piece: Line | Arc, i: int) -> Line | Arc:
-    """Return a piece of a profile with its numbers as floats; i: its number, for messages.
-
-    A piece that is no line or arc, not finite, or of length 0 is an InputError.
-    """
+    """Return piece number i with floats; one that is no line or arc, not finite or of length 0 is an InputError."""
     caller = f"Tool: piece {i}"
     if isinstance(piece, Line):
         a, b = (np.array(pair(f"{caller}: an end", p)) for p in piece)

@@ -121,10 +121,7 @@ class Tool:
         return tool
 
     def _set_pieces(self, pieces: list[Line | Arc], closed: bool) -> None:
-        """Store the lines and arcs of the profile, `closed` if the last point is the first.
-
-        No piece, a gap, a reversal or a crossing of the profile is an InputError.
-        """
+        """Store lines and arcs, `closed` or not; none, a gap, reversal or crossing is an InputError."""
         pieces = [checked(piece, i) for i, piece in enumerate(pieces)]
         if not pieces:
             raise InputError("Tool: a profile needs at least one piece, a Line or an Arc")

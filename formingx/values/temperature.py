@@ -159,10 +159,7 @@ class Arrhenius:
 
 
 def _difference(shift: Any, temperature: Any, limit: float, what: str) -> Any:
-    """Return temperatures (any shape or UFL) minus the lower limit of the range of a shift factor.
-
-    A number that is not above the limit is an InputError, with the law and the name of the limit.
-    """
+    """Return temperatures, any shape or UFL, above the limit of a shift; another number is an InputError."""
     if isinstance(temperature, ufl.core.expr.Expr):
         return temperature - limit
     temperature = np.asarray(temperature, dtype=float)

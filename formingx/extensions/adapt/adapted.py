@@ -92,10 +92,7 @@ def _adapted_sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
 
 
 def checked_columns(mesh: Mesh) -> Columns:
-    """Return the columns of elements along the sheet of a mesh.
-
-    A mesh without columns, or whose nodes were moved, is an InputError.
-    """
+    """Return the columns along the sheet of a mesh; none, or nodes that were moved, are an InputError."""
     columns = mesh.columns
     if columns is None:
         raise InputError("adapted: must be a mesh made by disc, sphere, parison or from_lines, or, in three dimensions,"

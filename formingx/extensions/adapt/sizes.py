@@ -43,10 +43,7 @@ def required_sizes(path: Any, max_rotation: float | None, error: float | None) -
 
 
 def _neighbours(triangles: np.ndarray) -> np.ndarray:
-    """Return the numbers of each pair of triangles with a common edge, shape (k, 2).
-
-    triangles: node numbers, shape (m, 3).
-    """
+    """Return the numbers of triangles, shape (m, 3), with a common edge in pairs, shape (k, 2)."""
     numbers = edges_of(triangles)[2]
     triangle = np.tile(np.arange(len(triangles)), 3)
     order = np.argsort(numbers, kind="stable")
@@ -55,10 +52,7 @@ def _neighbours(triangles: np.ndarray) -> np.ndarray:
 
 
 def _graded(points: np.ndarray, triangles: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return sizes, shape (n,), reduced in place so that they differ by at most 0.25 of the length of an edge.
-
-    Nodes have positions (n, 3), triangles the node numbers (m, 3).
-    """
+    """Return sizes (n,) of nodes (n, 3) reduced in place to differ by at most 0.25 of an edge of triangles (m, 3)."""
     a, b = edges_of(triangles)[1].T
     growth = GROWTH * np.linalg.norm(points[a] - points[b], axis=1)
     while True:

@@ -243,10 +243,7 @@ def compare(ours: Any, theirs: Any, *, columns: Mapping[str, str] | Sequence[str
 
 
 def _compare_maps(left: csv_files.CsvTable, right: csv_files.CsvTable, names: list[str]) -> Comparison:
-    """Return the comparison of two maps of walls at the positions (X, Y) of theirs.
-
-    Points of theirs that all lie outside ours are an InputError.
-    """
+    """Return the comparison of two maps of walls at their (X, Y); if all lie outside ours, an InputError."""
     from scipy.interpolate import LinearNDInterpolator
     ours, theirs = (np.column_stack([side.take(c, side.units[c]) for c in (*_MAP, *names)]) for side in (left, right))
     found = LinearNDInterpolator(ours[:, :2], ours[:, 2:])(theirs[:, :2])

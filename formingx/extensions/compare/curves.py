@@ -45,10 +45,7 @@ class SampledCurve:
         self.line = self.evaluate(self.arc_lengths)
 
     def closest_point(self, point: np.ndarray, k: int) -> tuple[np.ndarray, bool]:
-        """Return the closest point of the curve next to sample k, (c,), and True for a point beyond an end.
-
-        Only the two pieces of the curve that meet at the sample are examined.
-        """
+        """Return the closest point (c,) on the two pieces that meet at sample k, and True for one beyond an end."""
         low, high = max(k - 1, 0), min(k + 1, CURVE_POINTS - 1)
         line = self.evaluate(np.linspace(self.arc_lengths[low], self.arc_lengths[high], PIECE_POINTS))
         d = np.diff(line, axis=0)

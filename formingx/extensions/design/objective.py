@@ -111,10 +111,7 @@ class WallObjective:
         return float(residual + (0.0 if self.volume is None else (run.volume / self.volume - 1) ** 2))
 
     def shortfall(self, run: DesignRun) -> str:
-        """Return a text on the deviation of the best run from the wanted wall, and its reason.
-
-        It is "" if all deviations are below 1 %, or no wall was wanted.
-        """
+        """Return text on the best run's deviation from the wanted wall and its reason; "" below 1 % or without one."""
         if self.target_wall is None:
             return ""
         wall = run.wall[self.inside]
@@ -194,10 +191,7 @@ def _range(wall: np.ndarray) -> str:
 
 
 def mask_of_range(run: DesignRun, within: tuple[float, float] | None) -> np.ndarray:
-    """Return the mask of nodes of the bottom face in a range of reference lengths, shape (k,).
-
-    With None all nodes count; fewer than two nodes are an InputError.
-    """
+    """Return the mask (k,) of bottom nodes in a range of reference lengths, None: all; below two are an InputError."""
     s = run.reference_length
     if within is None:
         return np.ones(len(s), dtype=bool)

@@ -63,10 +63,7 @@ class _PerturbedPaths:
                 raise Failure(f"parameter {run.name} changes what the stages drive or how they end", [])
 
     def run(self) -> None:
-        """Solve for the perturbed runs at the states of the base run, from its first state to its last.
-
-        Without derivatives by the parameters a `Failure` says why.
-        """
+        """Solve for the perturbed runs at all states of the base run; a `Failure` says why derivatives are missing."""
         states = self.path.states
         history = self.problem.history.path_dependent
         if history and any(state.kind == "jump" for state in states):
@@ -97,10 +94,7 @@ class _PerturbedPaths:
             raise Failure("it did not reach its target", [])
 
     def _start(self, state: State) -> None:
-        """Set the perturbed runs to the first state of their path: undeformed, or in equilibrium with initial loads.
-
-        state: first state of the base run.
-        """
+        """Set the perturbed runs to their first state: undeformed, or in equilibrium with initial loads, as `state`."""
         for run in self.runs:
             run.x, run.control = state.x.copy(), state.control
         self._closing: list[np.ndarray] = []
@@ -305,10 +299,7 @@ def _fixed_properties(p: Plan) -> tuple[list[int], list[tuple[int, int]], list[i
 
 
 def _projected(law: Any, x: np.ndarray, velocity: np.ndarray, gap: np.ndarray) -> np.ndarray:
-    """Move points along their velocities until they have given gaps, to first order; positions (n, 2), length.
-
-    Gaps are signed distances, shape (n,), length. A point with a velocity along the tool stays.
-    """
+    """Move points (n, 2) along velocities to signed gaps (n,), length, to first order; along the tool they stay."""
     near = law.nearest(x)
     rate = np.einsum("ni,ni->n", near.normal, velocity)
     towards = abs(rate) > 1e-3 * np.linalg.norm(velocity, axis=1)

@@ -124,10 +124,7 @@ def _parts(runs: list[Any], names: list[str], units: Units) -> dict[str, Callabl
 
 
 def _sections(runs: list[Any], names: list[str], units: Units) -> str:
-    """Return an HTML figure of the sections of several runs side by side, coloured by the wall thickness.
-
-    runs: `DesignRun` objects. names: titles of their panels. units: units of the labels.
-    """
+    """Return an HTML figure of titled sections of `DesignRun` objects side by side, coloured by the wall thickness."""
     from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
@@ -203,10 +200,7 @@ def _profiles(before: Any, best: Any) -> str:
 
 
 def _heat_map(effects: Any, units: Units) -> str:
-    """Return an HTML figure: a heat map of the derivatives of the wall by all parameters.
-
-    effects: the derivatives, an `Effects`. units: units of the labels.
-    """
+    """Return an HTML figure: a heat map of the derivatives of the wall by all parameters, an `Effects`."""
     drawing, axes = figure(1, width=9, height=float(np.clip(1.6 + 0.28 * len(effects.names), 2.6, 9)))
     effects.plot(axes)
     axes.set(xlabel=units.label("reference_length"))

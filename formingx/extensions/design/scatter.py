@@ -118,10 +118,7 @@ def covariance_of(caller: str, parameters: Parameters, given: Any) -> np.ndarray
 
 
 def band(run: Any, given: Any, measure: Any, confidence: float) -> Band:
-    """Return an output quantity of a run with its confidence band for uncertain parameters, to first order.
-
-    `given` and `measure` as in `DesignRun`; a level outside (0, 1) is an InputError.
-    """
+    """Return an output quantity of a run with its confidence band, to first order; arguments as in `DesignRun`."""
     confidence = fraction("band: confidence", confidence)
     effects = run.sensitivities(measure)
     deviation = deviations(effects.jacobian, covariance_of("band", run.parameters, given))

@@ -218,10 +218,7 @@ def fit(material: type[Material] | Material, data: Any, terms: int | None = None
 
 
 def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest | MeasuredOscillation]:
-    """Return the tests of the files among the data; empty if the data are no files.
-
-    A `test` or `specimen` without files is an InputError.
-    """
+    """Return the tests of the files among the data, if any; a `test` or `specimen` without files is an InputError."""
     names = [data] if isinstance(data, str | os.PathLike) else data
     if not (isinstance(names, list | tuple) and names and all(isinstance(name, str | os.PathLike) for name in names)):
         if test is not None or specimen is not None:
@@ -236,10 +233,7 @@ def _files(data: Any, test: str | None, specimen: Any) -> list[MeasuredTest | Me
 
 
 def _temperatures(data: Any, files: Sequence[MeasuredTest | MeasuredOscillation], given: Any) -> list[float] | None:
-    """Return the temperature of each test from the arguments of `fit`, or None if it is not known.
-
-    Another number of temperatures than tests, or ones in the files too, are an InputError.
-    """
+    """Return the temperature of each test, or None if unknown; another number, or ones in files too: InputError."""
     columns = [entry.temperature for entry in files]
     if given is None:
         if any(T is None for T in columns) and any(T is not None for T in columns):
@@ -452,10 +446,7 @@ def _in_time(files: Sequence[MeasuredTest | MeasuredOscillation]) -> list[TimedT
 
 
 def _guesses(material: Any, points: Points, terms: int | None) -> list[Material]:
-    """Return materials with the constants from which a fit starts.
-
-    No material, wrong terms, or stresses whose sign differs from the strains are an InputError.
-    """
+    """Return materials from which a fit starts; no material, wrong terms or stresses of wrong sign: InputError."""
     if isinstance(material, Material):
         if terms is not None:
             raise InputError(f"fit: terms = {terms!r} is for the class Ogden; {material} has its terms already")

@@ -168,10 +168,7 @@ class ShiftedTests:
         return np.concatenate(found)
 
     def spectrum_misfit(self, factors: np.ndarray) -> float:
-        """Return the squared misfit of the best spectrum with two times per decade and nonnegative moduli.
-
-        `factors` are the shifts of the tests.
-        """
+        """Return the squared misfit of the best nonnegative spectrum, two times per decade, with shifts `factors`."""
         from scipy.optimize import nnls
         low = min(first - np.log(a) for (first, _, _), a in zip(self._branches, factors))
         high = max(last - np.log(a) for (_, last, _), a in zip(self._branches, factors))
@@ -182,10 +179,7 @@ class ShiftedTests:
         return float(nnls(columns / self.sizes[:, None], self.stress / self.sizes)[1] ** 2)
 
     def stresses(self, material: GeneralisedMaxwell, constants: Any, factors: np.ndarray) -> np.ndarray:
-        """Return the nominal stresses of a material at all measured points, shape (n,), with shifts of tests.
-
-        The constants, at the reference temperature, have the order of `parameters`.
-        """
+        """Return nominal stresses (n,) at all points with shifts; constants, at the reference, follow `parameters`."""
         values, n = np.asarray(constants, float), len(material.parameters) - 2 * len(material.branches)
         rest = equilibrium_values(self._rows, material.equilibrium, values[:n])
         return rest + self.branches(values[n + 1::2], factors) @ values[n::2]

@@ -50,10 +50,7 @@ def _kind(test: Any) -> str:
 
 
 def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
-    """Draw {test: (stretches, stresses)}, (n,) each, with curves of the material on axes.
-
-    "biaxial" has two stretches and two stresses.
-    """
+    """Draw {test: (stretches, stresses)}, (n,) each, "biaxial" two of each, with curves of the material on axes."""
     for mode, (l, *others, P) in data.items():
         if others:                                          # two stretches, two stresses
             _draw_biaxial(material, (l, *others, P), panel)
@@ -64,10 +61,7 @@ def _draw_elastic(material: Any, data: dict, panel: Any) -> None:
 
 
 def _draw_biaxial(material: Any, columns: Any, panel: Any) -> None:
-    """Draw stresses of a biaxial test over its first stretch, and the stresses of the material as crosses.
-
-    Columns are two stretches and two nominal stresses, (n,) each.
-    """
+    """Draw both stresses of biaxial columns over the first stretch, and those of the material as crosses."""
     l1, l2, *stresses = (np.asarray(x, float) for x in columns)
     computed = material.stress("biaxial", np.stack([l1, l2]))
     for k, (P, found) in enumerate(zip(stresses, computed), 1):

@@ -187,10 +187,7 @@ def _law(kind: str, temperatures: np.ndarray, reference: float, unit: str) -> _S
 
 
 class _LogTable:
-    """Shift aT(T) whose logarithm is a smooth curve through given points, constant beyond them.
-
-    Points are {temperature: log10 aT}.
-    """
+    """Shift aT(T) whose logarithm is a smooth curve through {temperature: log10 aT}, constant beyond."""
 
     def __init__(self, points: dict[float, float]):
         self._table = Table(points)

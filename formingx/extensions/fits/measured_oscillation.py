@@ -99,10 +99,7 @@ def read_oscillations(caller: str, columns: dict[str, int], rows: list[tuple[int
 
 def used_columns(caller: str, columns: dict[str, int], rows: list[tuple[int, list[str]]], units: Mapping[str, Any],
                  known: Container[str], units_of: Mapping[str, tuple[str, ...]]) -> dict[str, int]:
-    """Return {quantity: column} of the known columns, without unused columns of text.
-
-    An unknown column of numbers, or a unit that is not in {quantity: units}, is an InputError.
-    """
+    """Return {quantity: column} of known columns; unknown columns of numbers or units are an InputError."""
     for name, k in columns.items():
         numeric = any(k < len(row) and is_number(row[k]) for _, row in rows)
         if name not in known and numeric:

@@ -169,10 +169,7 @@ def nearest_test(largest: float, middle: float) -> str:
 
 
 def _hull(points: np.ndarray) -> np.ndarray:
-    """Return the k corners of the convex hull of points, shape (n, 2), counter-clockwise, shape (k, 2).
-
-    It is computed by Andrew's monotone chain algorithm.
-    """
+    """Return the corners of the convex hull of points (n, 2), counter-clockwise (k, 2), by Andrew's monotone chain."""
     ordered = sorted(map(tuple, np.unique(points.round(10), axis=0)))
     if len(ordered) < 3:
         return np.array(ordered)

@@ -30,10 +30,7 @@ def divisors(parts: list[np.ndarray], relative: Any, weights: list[float], floor
 
 
 def named_weights(weights: Any, names: list[str]) -> list[float]:
-    """Return the weight of each test from {test: weight}, in the order of names; the default is 1.
-
-    An unknown test, or a weight that is not positive, is an InputError.
-    """
+    """Return weights of tests in the order of names, default 1; unknown or not positive ones are an InputError."""
     if weights is None:
         return [1.0] * len(names)
     if not isinstance(weights, dict):
@@ -45,10 +42,7 @@ def named_weights(weights: Any, names: list[str]) -> list[float]:
 
 
 def numbered_weights(weights: Any, count: int) -> list[float]:
-    """Return the weights of a list of tests in time; None: all 1.
-
-    Another number of weights, or one that is not positive, is an InputError.
-    """
+    """Return the positive weights of `count` tests in time, None: all 1; others are an InputError."""
     if weights is None:
         return [1.0] * count
     given = as_list("fit: weights", weights, "numbers, one for each test")
@@ -65,10 +59,7 @@ def _weight(name: str, value: Any) -> float:
 
 
 def in_range(within: Any, stretches: np.ndarray) -> np.ndarray:
-    """Return the mask of the stretches, any shape, in the range `within`; None for all.
-
-    No pair of ascending stretches is an InputError.
-    """
+    """Return the mask of stretches, any shape, within an ascending pair (else an InputError); None for all."""
     if within is None:
         return np.ones(np.shape(stretches), dtype=bool)
     low, high = pair("fit: within", within)

@@ -191,10 +191,7 @@ def beyond_known_range(body: Any) -> Iterator[Finding]:
 
 @register("end")
 def passed_known_range(path: Any) -> Iterator[Finding]:
-    """Yield a warning for each end of a constant's range that the temperature of the body passed; collective.
-
-    Constants about which a check warned before the run are left out.
-    """
+    """Yield warnings for ends of constants' ranges that the temperature passed, unless warned before; collective."""
     reported = {finding.about for finding in path.record.findings}
     states = path.record.segments[-1].states
     for k, history in enumerate(path.problem.history.parts):
@@ -208,10 +205,7 @@ def passed_known_range(path: Any) -> Iterator[Finding]:
 
 
 def _outside_known_range(scene: Any, low: float, high: float, cause: str) -> Iterator[Finding]:
-    """Yield warnings for constants of materials, friction and expansion that are unknown at `low` or at `high`.
-
-    `cause` is subject and verb of the message, such as "the run brought it".
-    """
+    """Yield warnings for constants unknown at `low` or `high`; `cause` is subject and verb of the message."""
     laws = [(f"materials[{layer!r}]", name, value) for layer, material in scene.materials.items()
             for name, value in material.constants().items()]
     laws += [(repr(contact), "friction", contact.mu) for contact in scene.contacts]

@@ -237,10 +237,7 @@ class Cooling:
 
 
 def _extremes(temperatures: list[float], laws: Sequence[Any]) -> tuple[float, float]:
-    """Return bounds of the temperature from initial `temperatures` and laws of heat, by the maximum principle.
-
-    They are -inf and inf if a law prescribes a flux without a temperature.
-    """
+    """Return bounds of the temperature by the maximum principle; -inf and inf if a law prescribes a bare flux."""
     for law in laws:
         if not getattr(law, "temperatures", ()):            # a flux without a temperature has no bound
             return -np.inf, np.inf

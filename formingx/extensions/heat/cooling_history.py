@@ -272,10 +272,7 @@ class CoolingHistory:
                           for touch, excess in zip(self._body.tool_contacts, variables.tool_excess, strict=True)]}
 
     def load(self, data: dict[str, Any]) -> HeatState:
-        """Return the state of this rank from data of `save`.
-
-        InputError: another mesh, or `work_to_heat` in one run only.
-        """
+        """Return this rank's state from data of `save`; InputError: another mesh, or `work_to_heat` in one run only."""
         matching = partial(matching_rows, tolerance=1e-9 * np.abs(data["points"]).max(),
                            message="the temperature history belongs to another mesh")
         rows = matching(self._body.points, data["points"])

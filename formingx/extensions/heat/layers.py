@@ -98,10 +98,7 @@ def _cuts(grid: Grid, depths: Mapping[str, tuple[float, float]],
 
 
 def _distance_from_edges(points: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return the distance of n points, shape (n, 2), from the nearest straight edge, shape (n,), length.
-
-    Edges are pairs of node numbers, shape (m, 2).
-    """
+    """Return the distance of points (n, 2) from the nearest straight edge, node numbers (m, 2), shape (n,), length."""
     away = np.full(len(points), np.inf)
     for a, b in points[edges]:
         along = np.clip((points - a) @ (b - a) / ((b - a) @ (b - a)), 0.0, 1.0)

@@ -137,10 +137,7 @@ class _Displacement:
 
 
 def _set_initial_temperature(body: Conduction, start: Any, unit: str) -> None:
-    """Set the initial temperature `T` of a body; raise an InputError if it is below absolute zero or in another unit.
-
-    start: initial temperature, as the argument of `heat`.
-    """
+    """Set the initial temperature `T` of a body; below absolute zero, or in another unit, it is an InputError."""
     if getattr(start, "unit", unit) != unit:
         raise InputError(f"heat: start: is in {start.unit!r}, this run in {unit!r}: must be in the same unit")
     T = fields.values_at(start, body.points, body.mesh, "heat: start")
@@ -229,10 +226,7 @@ def implausible_radiation(materials: Iterable[ThermalProperties], boundaries: It
 
 
 def checked_materials(mesh: Mesh, materials: Any) -> dict[str, ThermalProperties]:
-    """Return {layer: `ThermalProperties`} from the argument of a user, one for all layers or by layer.
-
-    A layer without properties or another type is an InputError.
-    """
+    """Return {layer: `ThermalProperties`} from one for all layers or by layer; missing ones are an InputError."""
     if isinstance(materials, ThermalProperties):
         materials = dict.fromkeys(mesh.layers, materials)
     if not isinstance(materials, Mapping):

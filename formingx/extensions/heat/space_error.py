@@ -67,10 +67,7 @@ class SpaceError:
         return found
 
     def _in_cubic_space(self, own: np.ndarray) -> np.ndarray:
-        """Return the nodal values of a function in the space of cubic elements, locally owned entries, shape (k,).
-
-        own: its nodal values in the space of quadratic elements, locally owned entries, shape (n,).
-        """
+        """Return owned nodal values (n,) of quadratic elements as owned values (k,) in the space of cubic ones."""
         self._values.x.array[: len(own)] = own
         self._values.x.scatter_forward()
         self._cubic_values.interpolate(self._values)

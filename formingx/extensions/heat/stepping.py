@@ -36,10 +36,7 @@ class Step(NamedTuple):
 
 
 def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
-    """Take one time step of the heat equation by TR-BDF2 from a temperature state (see `Conduction`).
-
-    The error is infinite if Newton's method found no solution.
-    """
+    """Take a TR-BDF2 step of the heat equation from a temperature state; the error is inf if Newton's method fails."""
     c = dt * _D
     first, heats_first = body.rates(state)
     try:

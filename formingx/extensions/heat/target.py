@@ -62,10 +62,7 @@ class PointTemperature(Quantity):
         return c
 
     def _crossing(self, target: float, last: float, control: float) -> float:
-        """Return the time at which the temperature is the target, by regula falsi from the last accepted state on.
-
-        If the temperature does not reach the target, it is a time far ahead.
-        """
+        """Return the time, far ahead if never, when the target is reached after the last state, by regula falsi."""
         before = self._crossed[1] - last if self._crossed else 0.0
         a, b = last, last + max(before, self._short)
         fa, fb = self._at(a, control) - target, self._at(b, control) - target

@@ -218,10 +218,7 @@ def _quadratic_weight(x: np.ndarray) -> np.ndarray:
 
 
 def _quadratic_weight_slope(x: np.ndarray) -> np.ndarray:
-    """Return the derivative of [x - 2 + (x + 2) e^-x]/x^2 by x, in the shape of x.
-
-    x: length of the step over the relaxation time.
-    """
+    """Return d/dx of [x - 2 + (x + 2) e^-x]/x^2, in the shape of x, the step over the relaxation time."""
     small = x < 1e-2
     y = np.where(small, 1.0, x)
     series = 1 / 6 - x / 6 + 3 * x**2 / 40 - x**3 / 45 + 5 * x**4 / 1008

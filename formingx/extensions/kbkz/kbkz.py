@@ -231,10 +231,7 @@ class KBKZ(RelaxingMaterial):
         return np.array(found)
 
     def _biaxial(self, l: np.ndarray) -> np.ndarray:
-        """Return the nominal stresses in both directions after a sudden biaxial stretch, shape (2, ...).
-
-        l: the two stretches, shape (2, ...).
-        """
+        """Return the nominal stresses in both directions after a sudden biaxial stretch l, shape (2, ...) each."""
         if l.shape[:1] != (2,) or not np.all((l > 0) & np.isfinite(l)):
             raise InputError(f"{self}: stress: stretches of a biaxial test must be (l1, l2), each above 0")
         squares = np.stack([*l**2, 1 / (l[0] * l[1])**2])

@@ -52,10 +52,7 @@ class StoredStates(NamedTuple):
 
 
 class PastStates:
-    """Past states of one material in a run, as a `formingx.forms.history.History`.
-
-    `refresh` updates the coefficients of the stress in the forms.
-    """
+    """Past states of a material as a `formingx.forms.history.History`; `refresh` updates coefficients in the forms."""
 
     rate_dependent = True
 
@@ -237,10 +234,7 @@ class PastStates:
                 **({} if variables.smallest_h is None else {"smallest_h": of_all(variables.smallest_h)})}
 
     def load(self, data: dict[str, Any]) -> StoredStates:
-        """Return the past states of this rank for `put`, from the result of `save`.
-
-        Data of another mesh or another material are an InputError.
-        """
+        """Return past states of this rank for `put` from data of `save`; another mesh or material is an InputError."""
         numbers = np.array(data.get("cells", []), dtype=np.int64)
         rows = np.minimum(np.searchsorted(numbers, self._numbers), len(numbers) - 1)
         found = [(np.array(s["reduced_time"], float), np.array(s["C"], float)) for s in data.get("states", [])]

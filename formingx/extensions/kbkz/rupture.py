@@ -28,10 +28,7 @@ def ruptures(body: Any) -> Iterator[Finding]:
 
 @register("failure")
 def thins(failure: Any) -> Iterator[Finding]:
-    """Yield the thinnest point of a damped melt that thins without end in a failed run's last state; collective.
-
-    Its equibiaxial stretch exceeds `rupture_stretch`.
-    """
+    """Yield a damped melt's thinnest point, in a failed run's last state, beyond `rupture_stretch`; collective."""
     if failure.last is None:
         return
     problem, drawn = failure.problem, None

@@ -107,10 +107,7 @@ def to_msh(path: Path, file: Any, state: State | None = None) -> None:
 
 
 def _with_new_elements(problem: Any, state: Any, size: float) -> Mesh:
-    """Return a mesh of the deformed body in a state, with new elements of edge length `size` inside its outline.
-
-    Several layers, or several ranks, are an InputError.
-    """
+    """Return a mesh of the deformed body with new elements of a size; several layers or ranks are an InputError."""
     from ..remeshing.outline_mesh import mesh_of_outline
     mesh, outline = problem.scene.mesh, Outline(problem.forms)
     if len(mesh.layers) > 1 or mesh.comm.size > 1:

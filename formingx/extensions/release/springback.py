@@ -209,10 +209,7 @@ def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration:
 
 
 def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
-    """Return the scene of the part alone, constrained on its symmetry planes and against rigid motion.
-
-    `heat` is the `Cooling` after the release, or None.
-    """
+    """Return the scene of the part alone, held at symmetry planes and against rigid motion, with `heat` or None."""
     symmetries = [s for s in scene.supports if isinstance(s, Symmetry) and len(mesh.nodes_of(str(s.on)))]
     supports: list[Support] = [*symmetries]
     constrained = {s.component for s in symmetries}

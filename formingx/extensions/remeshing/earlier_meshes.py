@@ -43,10 +43,7 @@ class MaterialPointProbe(Probe):
 
 
 def original_positions(state_transfer: Any, points: np.ndarray) -> np.ndarray:
-    """Map points of a new mesh, shape (n, 2), length, back to their positions on the first mesh of the run.
-
-    They are interpolated from the nodes of the old mesh, in the deformed body.
-    """
+    """Map points of a new mesh (n, 2) to the first mesh of the run, through the old one's deformed nodes; length."""
     old, state = state_transfer.before
     nodes = node_positions(old.forms.domain)
     first = nodes if old.scene.state_transfer is None else original_positions(old.scene.state_transfer, nodes)
@@ -55,10 +52,7 @@ def original_positions(state_transfer: Any, points: np.ndarray) -> np.ndarray:
 
 
 def scene_on_new_mesh(mesh: Any, state_transfer: Any) -> Any:
-    """Return a scene on a new mesh of the deformed body, with materials and items of `StateTransfer.before`.
-
-    The last temperature on the old mesh becomes the initial one.
-    """
+    """Return the scene of `StateTransfer.before` on a mesh of the deformed body, with its last temperature."""
     old, state = state_transfer.before
     if old.temperature is None:
         return old.scene.with_mesh(mesh, state_transfer)

@@ -16,10 +16,7 @@ from .earlier_meshes import scene_on_new_mesh
 
 
 def save(problem: Any) -> dict[str, Any]:
-    """Return the data of a checkpoint of a mesh of a remeshed run, from which `load` makes a problem; on one rank.
-
-    Nodes and cells keep the order in which the mesh was made.
-    """
+    """Return checkpoint data of a mesh of a remeshed run for `load`, with nodes and cells in order; on one rank."""
     mesh = problem.scene.mesh
     grid, nodes = gathered(mesh), np.asarray(mesh.domain.geometry.input_global_indices, dtype=np.int64)
     number = mesh.domain.topology.original_cell_index

@@ -198,10 +198,7 @@ def _not_reached(record: Record, error: ConvergenceError) -> ConvergenceError:
 
 
 def _start_new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances) -> None:
-    """Remesh the body in the last state of a path, and add the first state on the new mesh to it, in equilibrium.
-
-    If no new mesh has an equilibrium, a ConvergenceError is raised.
-    """
+    """Remesh the body, and add the first state on the new mesh, in equilibrium, to the path, else ConvergenceError."""
     record, last = path.record, path.last
     stepping = next(s.stepping for s in reversed(record.segments[-1].states) if s.stepping)
     step = stepping["step"]

@@ -45,10 +45,7 @@ def separate_bodies(points: np.ndarray, triangles: np.ndarray, caller: str) -> l
 
 
 def merged(points: np.ndarray, triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Merge coincident vertices, shape (n, 3), length, to 1e-7 of the extent, and drop degenerate triangles.
-
-    Return the vertices, shape (k, 3), and the remaining triangles, shape (l, 3).
-    """
+    """Merge vertices (n, 3) within 1e-7 of the extent; return them (k, 3), and the triangles not degenerate (l, 3)."""
     size = max(float(np.ptp(points, axis=0).max(initial=0.0)), 1e-300)
     _, first, same = np.unique(np.round(points / size, 7), axis=0, return_index=True, return_inverse=True)
     triangles = same.ravel()[triangles]

@@ -35,10 +35,7 @@ _LARGE_WALL_ERROR = 0.2
 
 @register("end")
 def compression_without_relaxed_energy(path: Any) -> Iterator[Finding]:
-    """Yield a finding if 0.1 % or more of the reference area of a membrane is in compression; collective.
-
-    This holds for the last state, without relaxed energy (tension-field theory).
-    """
+    """Yield a finding if 0.1 % of a membrane without relaxed energy is in compression in the last state; collective."""
     scene = path.problem.scene
     if scene.kinematics.components != 3 or scene.model.wrinkles is not None:
         return

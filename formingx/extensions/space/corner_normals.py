@@ -317,10 +317,7 @@ def fitted_normals(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
 
 
 def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
-    """Return a function that solves for a right-hand side, shape (n,), with the MUMPS factors of a matrix.
-
-    It is symmetric positive definite, of scipy in compressed rows.
-    """
+    """Return the solver for right-hand sides (n,) of a symmetric positive definite scipy matrix, by MUMPS factors."""
     from petsc4py import PETSc
     first, columns = (part.astype(PETSc.IntType) for part in (matrix.indptr, matrix.indices))
     A = PETSc.Mat().createAIJ(matrix.shape, csr=(first, columns, matrix.data), comm=PETSc.COMM_SELF)
@@ -342,10 +339,7 @@ def _factorised(matrix: Any) -> Callable[[np.ndarray], np.ndarray]:
 
 def _equations(points: np.ndarray, triangles: np.ndarray, groups: np.ndarray
                ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the pairs of groups whose normals satisfy N_a.e + N_b.e = 0, shape (k, 2).
-
-    Also the weights of the equations, shape (k,), and the unit vectors e, shape (k, 3).
-    """
+    """Return the equations N_a.e + N_b.e = 0 of groups: pairs (k, 2), weights (k,) and unit vectors e (k, 3)."""
     x = np.zeros((int(groups.max()) + 1, 3))
     x[groups.ravel()] = points[triangles.ravel()]
     apex = np.concatenate([groups[:, (i + 2) % 3] for i in range(3)])

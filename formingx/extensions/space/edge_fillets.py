@@ -13,20 +13,14 @@ from .lagged_friction import Distances
 
 
 def rounded_minimum(a: np.ndarray, b: np.ndarray, fillet: float) -> np.ndarray:
-    """Return the signed distances from the common part of two solids with a fillet at their edge, shape (n,), length.
-
-    a, b: signed distances from both solids, shape (n,), length.
-    """
+    """Return the signed distances (n,) of the common part of two solids with a fillet, from theirs (n,); length."""
     R = fillet
     return np.maximum(R, np.minimum(a, b)) - np.hypot(np.maximum(R - a, 0.0), np.maximum(R - b, 0.0)) if R else (
         np.minimum(a, b))
 
 
 def rounded_distances(a: Distances, b: Distances, fillet: float) -> Distances:
-    """Return the distances of n points from the common part of two solids, with first and second derivatives.
-
-    a, b: distances from both solids. fillet: radius of the edge, length.
-    """
+    """Return distances, with first and second derivatives, of the common part of solids a and b with a fillet."""
     u, v = (np.maximum(fillet - part.distance, 0.0) for part in (a, b))
     nearer = (a.distance <= b.distance)[:, None]
     s = np.hypot(u, v)

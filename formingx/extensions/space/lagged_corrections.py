@@ -18,10 +18,7 @@ log = logging.getLogger("formingx")
 
 
 class LaggedCorrections:
-    """Corrections of a solved step, for all faces with lagged contact.
-
-    n: number of locally owned unknowns of the fields.
-    """
+    """Corrections of a solved step for all faces with lagged contact; n: number of owned unknowns of the fields."""
 
     def __init__(self, contacts: list[LaggedApproach], n: int):
         self._contacts, self._n = contacts, n

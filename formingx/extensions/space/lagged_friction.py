@@ -179,10 +179,7 @@ class LaggedFriction(LaggedStick):
         return rows, self._distances(x[rows])
 
     def motion(self, x: np.ndarray, old: ContactHistory | None) -> Motion:
-        """Return distances and normals at x, shape (n, 3), length, for a first-order prediction of distances.
-
-        They are 0 for open points. All slips are 0.
-        """
+        """Return distances (0 for open points) and normals at x, (n, 3), length, to predict distances; slips are 0."""
         assert old is not None
         d, n = np.zeros(len(x)), np.zeros_like(x)
         rows, distances = self.contact_distances(x, old)
@@ -190,10 +187,7 @@ class LaggedFriction(LaggedStick):
         return Motion(x, d, n, np.zeros(len(x)), np.zeros_like(x))
 
     def _distances(self, x: np.ndarray) -> Distances:
-        """Return distances, normals and Hessians at positions x, shape (n, 3), length.
-
-        The last four results are stored, and returned again for the same positions.
-        """
+        """Return distances, normals and Hessians at x, shape (n, 3), length; the last four results are stored."""
         for positions, found in self._last:
             if np.array_equal(positions, x):
                 return found

@@ -127,10 +127,7 @@ class LaggedApproach(Approach):
         return PassedTool(self.face)
 
     def passed(self, fields: np.ndarray, control: float) -> PassedPoint | None:
-        """Return the point of the tool that passed the sheet farthest; None if less than is resolved.
-
-        fields: owned unknowns, shape (n,).
-        """
+        """Return the point of the tool that passed the sheet farthest, None below resolution; fields: owned, (n,)."""
         if self._last is None or self._last[1] != control or not np.array_equal(self._last[0], fields):
             found = self._passed_tool.deepest(fields, control, LAGGED.max_passed_ratio, self._bridged_limit)
             self._last = fields.copy(), control, found
@@ -168,10 +165,7 @@ class LaggedApproach(Approach):
         return LAGGED.settling_iterations if self.has_lagged_friction else 0
 
     def separate(self, fields: np.ndarray, control: float) -> bool:
-        """Open the points in tension; return True if there are any.
-
-        Collective. fields, control: locally owned unknowns, shape (n,), and load parameter of the converged state.
-        """
+        """Open the points in tension in the state of owned `fields` (n,); return True if there are any; collective."""
         face, variables = self.face, self.face.get()
         if variables is None or not face.contact.separates:
             return False

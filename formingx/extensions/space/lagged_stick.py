@@ -74,10 +74,7 @@ class LaggedStick(ContactLaw):
         return np.zeros(len(x), dtype=bool) if old is None else self.in_contact(old)
 
     def distance(self, x: np.ndarray) -> np.ndarray:
-        """Return the signed distances of points, shape (n, 3) or (m, n, 3), length, positive inside.
-
-        The last three results are stored, and returned again for the same positions.
-        """
+        """Return signed distances at x, (n, 3) or (m, n, 3), length, positive inside; the last three are stored."""
         for positions, found in self._found:
             if np.array_equal(positions, x):
                 return found

@@ -107,10 +107,7 @@ def _capacity(wall: SheetWall, trim: Any) -> float | None:
 
 
 def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
-    """Return the share of the area of each triangle that remains after trimming, shape (m,).
-
-    trim: z of a plane, length, or an outline (x, y). Raise `InputError` if it does not meet the part.
-    """
+    """Return the remaining share of each triangle, (m,), by z of a plane or an outline (x, y), else an InputError."""
     points = wall.deformed_points
     if not isinstance(trim, list | tuple | np.ndarray):
         level, z = finite("part: trim", trim), points[:, 2]
@@ -129,10 +126,7 @@ def _trimmed_share(wall: SheetWall, trim: Any) -> np.ndarray:
 
 
 def _depth_in_polygon(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Return the distances of points, shape (n, 2), from a polygon, positive inside, shape (n,), length.
-
-    corners: shape (k, 2), length.
-    """
+    """Return distances (n,) of points (n, 2) from a polygon of corners (k, 2), positive inside, length."""
     inside, nearest = np.zeros(len(points), dtype=bool), np.full(len(points), np.inf)
     for a, b in zip(corners, np.roll(corners, -1, axis=0)):
         off, way = points - a, b - a
@@ -187,10 +181,7 @@ class SheetFilling(ColumnTable):
 
 
 def filling(path: Any, contact: Any, states: Any = None) -> SheetFilling:
-    """Return the filling of a tool by the sheet in some states of a run, all by default; collective.
-
-    In each state: the share of the sheet's area that touches the tool, and the largest distance from it.
-    """
+    """Return in states (None: all) the share of a sheet that touches a tool, and its largest gap; collective."""
     rows, comm, states = [], path.problem.comm, path.states if states is None else states
     tool = contact.contact.tool
     names = tool.names if isinstance(tool, Union) else []

@@ -94,19 +94,13 @@ class PatchSurface:
         return self._nearest(x, False)[1]
 
     def positions(self, triangles: np.ndarray, coordinates: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return points of the surface and its unit normals, out of the tool, shape (n, 3) each.
-
-        coordinates: barycentric, for the first two corners, shape (n, 2).
-        """
+        """Return points and outward unit normals, (n, 3) each, at barycentric coordinates of two corners, (n, 2)."""
         out = np.empty((len(triangles), 6, 3))
         _C.evaluate(len(triangles), triangles, self.patches, coordinates, out)
         return out[:, 0], unit(np.cross(out[:, 1], out[:, 2]))
 
     def _nearest(self, x: np.ndarray, derivatives: bool) -> tuple[Distances, np.ndarray]:
-        """Return the distances of points, shape (n, 3), length, and the nearest triangles, shape (n,).
-
-        derivatives: False to leave normals and Hessians empty.
-        """
+        """Return the distances of points (n, 3), length, optionally with derivatives, and nearest triangles (n,)."""
         n = len(x)
         d, normal, hessian = np.empty(n), np.empty((n, 3)), np.empty((n, 3, 3))
         guess = self._guesses.pop(n, None)

@@ -66,10 +66,7 @@ def rectangle(width: float, height: float, *, corner: float = 0.0, part: str = "
     last, names = (0.0, -b) if part == "half" else (a, 0.0), "rim"
 
     def add_piece(point: tuple[float, float], centre: tuple[float, float] | None = None, name: str = names) -> None:
-        """Append a straight piece, or an arc about `centre`, from the last point to `point`, unless both coincide.
-
-        name: name of the boundary that the piece belongs to.
-        """
+        """Append a line, or an arc about `centre`, to a `point` that is not the last, to the boundary `name`."""
         nonlocal last
         if math.dist(last, point) > 1e-12 * (a + b):
             found.append(Edge(last, point, centre, name))
@@ -166,10 +163,7 @@ def sheet(outline: Sequence[Any], size: float | Callable[[Any, Any], Any], *, na
 
 
 def outline_edges(outline: Any, caller: str) -> list[Edge]:
-    """Return the pieces of an outline, given by pieces or by the corners (x, y) of a polygon, length.
-
-    Raise `InputError` for another form, or for fewer than three corners.
-    """
+    """Return the pieces of an outline of pieces or of three corners (x, y) or more, length, else an InputError."""
     edges = as_list(caller, outline, "corners (x, y), or what fx.mesh.rectangle gives")
     if all(isinstance(edge, Edge) for edge in edges):
         return edges
@@ -223,10 +217,7 @@ class _Size:
             raise InputError(f"{where}: the function fails: {type(error).__name__}: {error}") from error
 
     def callback(self, dim: int, tag: int, x: float, y: float, z: float, size: float) -> float:
-        """Return the edge length of triangles at a point (x, y), for gmsh; 1e22 where the user's function fails.
-
-        gmsh also gives `dim`, `tag`, `z` and its own `size`, which are not used.
-        """
+        """Return the edge length at (x, y) for gmsh, 1e22 where the user's function fails; the rest is not used."""
         try:
             return self(x, y)
         except InputError as error:
@@ -234,10 +225,7 @@ class _Size:
             return 1e22
 
     def area_and_size(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Divide a polygon, shape (n, 2), into m equal areas; return them and the edge lengths there, shape (m,) each.
-
-        With a constant edge length there is one piece.
-        """
+        """Divide a polygon (n, 2) into m equal areas, 1 for constant size; return areas and edge lengths, (m,) each."""
         y = np.roll(x, -1, axis=0)
         area = abs(np.sum(x[:, 0] * y[:, 1] - x[:, 1] * y[:, 0])) / 2
         if self.constant:
@@ -299,10 +287,7 @@ def _grid(edges: list[Edge], size: _Size) -> Grid:
 
 
 def _reflected(grid: Grid, name: str) -> Grid:
-    """Return the mesh of a sheet joined with its mirror image about a straight boundary, which disappears.
-
-    Raise `InputError` if it is not straight, or if its straight extension crosses or touches the sheet.
-    """
+    """Return a sheet joined with its mirror image about a straight boundary that it does not cross, else InputError."""
     X, (sheet,) = grid.points, grid.layers.values()
     line = np.unique(grid.boundaries[name])
     middle, size = X[line].mean(0), 1e-9 * float(np.ptp(X, axis=0).max())

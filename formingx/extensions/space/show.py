@@ -230,10 +230,7 @@ def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
 
 
 def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
-    """Return the data that `report.js` draws: the sheet in each drawn state, and the tools.
-
-    record: numbers of the drawn states and travels of the tools.
-    """
+    """Return what `report.js` draws: the sheet in drawn states, and the tools, whose travels `record` has."""
     walls = [wall_of(path, path.states[k]) for k in record.frames]
     ratio = [wall.to_nodes(wall.ratio) for wall in walls]
     shown = {units.label("wall"): [wall.at_nodes for wall in walls], "wall / original": ratio}

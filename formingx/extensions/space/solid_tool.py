@@ -125,10 +125,7 @@ class SolidTool:
 
 
 def nearest_of(parts: list[Distances]) -> Distances:
-    """Return the distances of n points from the union of several solids, positive inside.
-
-    It is the largest distance from a solid, exact outside.
-    """
+    """Return distances of n points from a union of solids, positive inside: the largest, which is exact outside."""
     if len(parts) == 1:
         return parts[0]
     nearest = np.argmax([part.distance for part in parts], axis=0)
@@ -236,10 +233,7 @@ class Swept(SolidTool):
         write_stl(points + self.shift, triangles if volume(points, triangles) > 0 else triangles[:, ::-1], file)
 
     def _swept(self, outline: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return the vertices, shape (n, 3), length, and triangles, shape (m, 3), of a swept polyline.
-
-        outline: points (r, z), shape (k, 2), length.
-        """
+        """Return vertices (n, 3), length, and triangles (m, 3) of a swept outline, points (r, z), (k, 2), length."""
         rings = np.array([np.insert(self._ring(r), 2, z, axis=1) for r, z in outline])
         m, n = rings.shape[:2]
         row = np.arange(m * n).reshape(m, n)

@@ -19,10 +19,7 @@ _NEGLIGIBLE_CROSSING = 1e-5
 
 
 def read_stl(name: str, caller: str = "solid") -> tuple[np.ndarray, np.ndarray]:
-    """Return the vertices, shape (n, 3), and triangles, shape (m, 3), of an STL file, binary or text.
-
-    Raise `InputError` if the file cannot be read, or is no STL file of a surface.
-    """
+    """Return vertices (n, 3) and triangles (m, 3) of an STL file, binary or text; another file is an InputError."""
     try:
         with open(name, "rb") as stream:
             data = stream.read()
@@ -46,10 +43,7 @@ def read_stl(name: str, caller: str = "solid") -> tuple[np.ndarray, np.ndarray]:
 
 
 def check_closed(points: np.ndarray, triangles: np.ndarray, caller: str) -> None:
-    """Raise an `InputError` unless triangles, shape (m, 3), are closed and oriented alike.
-
-    Each edge must belong to as many triangles in one direction as in the other.
-    """
+    """Raise an InputError unless triangles (m, 3) have each edge as often in one direction as in the other."""
     directed, edges, numbers, times = edges_of(triangles)
     sense = np.zeros(len(edges))
     np.add.at(sense, numbers, np.where(directed[:, 0] < directed[:, 1], 1.0, -1.0))

@@ -132,10 +132,7 @@ class Surface(Formulation):
         return SelfPenetration(self)
 
     def area_row(self, deformed: bool = False) -> Any:
-        """Return the linear form (UFL) of the tributary areas of nodes, length^2, reference or deformed.
-
-        The area is in the first of the three entries of a node, the others are 0.
-        """
+        """Return the linear form (UFL) of nodes' areas, length^2, in the first of their three entries, else 0."""
         ratio = self.F[0, 0] * self.F[1, 1] if deformed else 1
         return ratio * ufl.split(self.test_function())[0][0] * self.dx(metadata={"quadrature_degree": 1})
 
@@ -300,10 +297,7 @@ class Surface(Formulation):
 
 
 class _AlwaysAdmissible:
-    """Check of the volume ratio for membranes, which every state passes, since J is always above 0.
-
-    It takes the place of `Admissible`, the check for solids.
-    """
+    """Check of the volume ratio for membranes, in place of `Admissible`: every state passes, since J > 0."""
 
     def holds(self) -> bool:
         """Return True: the volume ratio of a membrane is positive in every state."""
@@ -358,8 +352,5 @@ def smaller_stress(stretches: np.ndarray) -> np.ndarray:
 
 
 def wrinkled(stretches: np.ndarray) -> np.ndarray:
-    """Return the mask of points where a membrane wrinkles, shape (n,): `smaller_stress` is below -1e-3.
-
-    So the compression by elastic slip on a flat tool does not count.
-    """
+    """Return the mask (n,) of wrinkles: `smaller_stress` < -1e-3, which leaves out elastic slip on a flat tool."""
     return smaller_stress(stretches) < -NEGLIGIBLE

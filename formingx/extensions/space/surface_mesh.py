@@ -166,10 +166,7 @@ class SurfaceMesh(Mesh):
 
 
 def closest_points(places: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return the point of a surface closest to each of n places, shape (n, 3), its triangle (n,) and distance (n,).
-
-    places: shape (n, 3), length; corners of m triangles, shape (m, 3, 3), length.
-    """
+    """Return the closest point of triangles (m, 3, 3) to each place (n, 3), its triangle and distance (n,), length."""
     edges = np.roll(corners, -1, axis=1) - corners
     normal = np.cross(edges[:, 0], edges[:, 1])
     normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
@@ -190,10 +187,7 @@ def closest_points(places: np.ndarray, corners: np.ndarray) -> tuple[np.ndarray,
 
 
 def volume_within(points: np.ndarray, triangles: np.ndarray) -> float:
-    """Return the volume inside a surface, closed by lids normal to z and planes x = 0 and y = 0, length^3.
-
-    triangles: shape (m, 3), counter-clockwise from outside.
-    """
+    """Return the volume in outward triangles (m, 3), closed by lids normal to z and planes x = 0, y = 0, length^3."""
     corners = points[triangles]
     area = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
     return float(np.einsum("mi,mi->", corners.mean(1)[:, :2], area[:, :2]) / 2)

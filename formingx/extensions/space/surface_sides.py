@@ -102,10 +102,7 @@ class SurfaceSides:
 
 
 def _outer_nodes(cells: np.ndarray, X: np.ndarray, planes: tuple[Any, ...]) -> np.ndarray:
-    """Return the nodes at the edge of a surface, without its cuts at planes of symmetry, shape (k,).
-
-    cells: shape (m, 3). X: reference positions, shape (n, 3), length.
-    """
+    """Return the nodes (k,) at the edge of cells (m, 3), positions X (n, 3), without cuts at planes of symmetry."""
     _, edges, _, times = edges_of(cells)
     outer = edges[times == 1]
     for plane in planes:

@@ -111,10 +111,7 @@ class Triangulated(SolidTool):
         return ratio, place + self.shift
 
     def _covered(self, middle: np.ndarray) -> np.ndarray:
-        """Return the mask of the triangles that lie inside another body of the tool, shape (m,).
-
-        middle: a point slightly outside each triangle, shape (m, 3), length.
-        """
+        """Return the mask (m,) of triangles inside another body; middle: points just outside each, (m, 3), length."""
         found = np.zeros(self.triangles, dtype=bool)
         for k, rows in enumerate(self._bodies):
             for other in (*self.surfaces[:k], *self.surfaces[k + 1:]):

@@ -389,10 +389,7 @@ class SheetWall(ColumnTable):
         return found
 
     def _unrolled(self) -> tuple[np.ndarray, float]:
-        """Return the coordinates on the surface of a printed grid, shape (n, 2), and the period of the first, length.
-
-        The period is 0 for a flat sheet.
-        """
+        """Return coordinates (n, 2) of a printed grid, length, and the period of the first, 0 for a flat sheet."""
         X = self.reference_points
         if self.flat:
             return X[:, :2], 0.0
@@ -415,10 +412,7 @@ class SheetWall(ColumnTable):
 
 
 def wall_of(path: Any, state: Any) -> SheetWall:
-    """Return the wall thickness of a sheet in a state, with the positions of the nodes; collective.
-
-    The order of nodes and triangles does not depend on the number of ranks.
-    """
+    """Return the wall of a sheet in a state with positions of nodes, in the same order on any ranks; collective."""
     problem = path.problem
     forms, domain, comm = problem.forms, problem.forms.domain, problem.comm
     own = own_cells(domain)

@@ -261,10 +261,7 @@ class StabilityAnalysis:
         return [self._critical_point(segment, entry, limit) for entry, limit in zip(found, limits, strict=True)]
 
     def _is_limit_point(self, segment: Any, found: LocatedPoint) -> bool:
-        """Return True if the mode of a located point is nearly parallel to the path tangent, as at a limit point.
-
-        segment: the `Segment`, the part of the path on one mesh.
-        """
+        """Return True if the mode of a located point is nearly parallel to the path tangent in its `Segment`."""
         x, direction, problem = found.x, found.left.direction, segment.problem
         a, b = problem.x.duplicate(), problem.x.duplicate()
         a.array_w[:], b.array_w[:] = x, direction
@@ -274,10 +271,7 @@ class StabilityAnalysis:
         return bool(cosine > 0.5)
 
     def _critical_point(self, segment: Any, found: LocatedPoint, limit: bool) -> CriticalPoint:
-        """Return the `CriticalPoint` of a located point, with the mode at the nodes of all ranks.
-
-        `limit` is True for a limit point.
-        """
+        """Return the `CriticalPoint` of a located point, with the mode at all ranks' nodes; limit: a limit point."""
         comm, nodes = segment.problem.comm, self.modes_of(segment).variation.nodes
         points, amplitudes = gathered(comm, nodes), gathered(comm, found.mode)
         size = np.linalg.norm(amplitudes, axis=1)

@@ -208,10 +208,7 @@ class Modes:
         return found
 
     def _state_between(self, a: State, b: State, fraction: float) -> State:
-        """Solve for the state at a fraction (0 to 1) of the way from state a of the path to state b.
-
-        `Failure` reports no convergence, or convergence to another branch.
-        """
+        """Solve for the state at a fraction, 0 to 1, from state a to b; no convergence there is a `Failure`."""
         if self.problem.history.path_dependent:
             raise Failure("with a history the state between two others depends on the steps", [])
         with self.problem.state_context(a):
@@ -289,10 +286,7 @@ class Modes:
 
 
 def _root(values: list[tuple[float, float]], low: float, high: float) -> float | None:
-    """Return the fraction of a step at which an eigenvalue is 0, by inverse interpolation; None out of bounds.
-
-    At most four (fraction, eigenvalue) pairs of smallest magnitude are used.
-    """
+    """Return the fraction of zero eigenvalue by inverse interpolation of the four smallest pairs; None outside."""
     known = sorted(values, key=lambda entry: abs(entry[1]))[:4]
     for n in range(len(known), 1, -1):
         s, f = (np.array([entry[k] for entry in known[:n]]) for k in (0, 1))

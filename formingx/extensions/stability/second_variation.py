@@ -139,10 +139,7 @@ class SecondVariation:
         return found
 
     def _find_rigid(self) -> list[np.ndarray]:
-        """Return the rigid motions of the present wave number that constraints leave free and that cause no force.
-
-        They are modes of unit Euclidean norm, locally owned entries.
-        """
+        """Return free rigid motions of the wave number without force, unit Euclidean norm, owned entries."""
         kinematics, owned = self.problem.scene.kinematics, self._constrained[self._constrained < self._owned]
         R = np.array([self._unknowns_of(mode) for mode in kinematics.rigid_modes(float(self._number.value))])
         if not len(R):
@@ -154,10 +151,7 @@ class SecondVariation:
         return [mode / np.sqrt(self._sum(mode * mode)) for mode in free if self._moves_freely(mode)]
 
     def _moves_freely(self, mode: np.ndarray) -> bool:
-        """Return True if a rigid motion causes no force: if its product with the second variation `matrix` is 0. mode:
-
-        the rigid motion, locally owned entries, shape (n,).
-        """
+        """Return True if a rigid motion, owned entries (n,), causes no force: its product with `matrix` is 0."""
         x, y, diagonal = self.matrix.createVecRight(), self.matrix.createVecRight(), self.matrix.getDiagonal()
         x.array_w[:] = mode
         self.matrix.mult(x, y)
@@ -274,10 +268,7 @@ class SecondVariation:
         self._pressures = int(self.comm.allreduce(mine))
 
     def _dofs(self, component: int, item: Any) -> np.ndarray:
-        """Return the local numbers of the unknowns that a support constrains, with ghosts.
-
-        Component 0 is U (radial), 1 is W (axial), 2 the third unknown of the mode, V + m U.
-        """
+        """Return local unknowns, with ghosts, that a support constrains in U, W or V + m U (component 0, 1, 2)."""
         space, forms = self.space.sub(0).sub(component), self._forms
         if item.on is not None:
             return fem.locate_dofs_topological(space, 1, forms.mesh.facets_of(item.on))

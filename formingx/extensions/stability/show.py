@@ -22,10 +22,7 @@ def draw(point: Any, file: Any, scale: float | None) -> None:
 
 
 def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Return for each boundary deformed positions (m, 2), length, and amplitudes U, W, V (m, 3); collective.
-
-    The axis of an axisymmetric body is left out.
-    """
+    """Return for each boundary but the axis deformed positions (m, 2), length, and U, W, V (m, 3); collective."""
     path, state = point.path, point.state
     segment = path.record.segment(point.left)
     mesh = segment.problem.scene.mesh

@@ -238,10 +238,7 @@ def top_load(body: Mesh, *, material: Any, travel: float, floor: Tool | None = N
 
 
 def _press(scene: Scene, travel: float, step: StepControl) -> tuple[Path, str]:
-    """Return the path of a neck that moves by `travel` (length), and the reason why it ended before, or "".
-
-    A run that fails before its second state raises a ConvergenceError.
-    """
+    """Return the path of a neck to a `travel`, and why it ended before, or ""; none at all is a ConvergenceError."""
     try:
         return trace(scene, until=travel_to(travel), progress=False, step=step), ""
     except ConvergenceError as error:

@@ -80,10 +80,7 @@ class Study(ColumnTable):
         return min(self.successful, key=self._cost)
 
     def _measures_of_goal(self, a: str | None, b: str | None) -> tuple[str, str]:
-        """Return the names of two measures; by default the first two of the goal.
-
-        One measure alone, or none with fewer than two in the goal, is an InputError.
-        """
+        """Return two measures' names, default the goal's first two; one, or too few there, is an InputError."""
         if a is not None and b is not None:
             return a, b
         if a is not None or b is not None or len(self.goal) < 2:
@@ -373,10 +370,7 @@ def study(build: Callable[..., Any], variables: Mapping[str, Sequence[float]] | 
 
 
 def _measures(build: Any, measures: Any) -> dict[str, Measure]:
-    """Return `measures` as a new dict of functions and column names, after a check of it and of `build`.
-
-    An InputError names what is no function or no column.
-    """
+    """Return `measures` as a new dict; `build` or one that is no function or column is an InputError."""
     if not callable(build):
         raise InputError(f"study: build = {build!r}: must be a function of the variables that gives back a path")
     if not isinstance(measures, Mapping) or not measures or not all(callable(m) or isinstance(m, str)

@@ -53,10 +53,7 @@ class Task(NamedTuple):
     measures: dict[str, Measure]
 
     def __call__(self, values: dict[str, float]) -> StudyRun:
-        """Run `build` with values of the variables; return its measures, or the reason for its failure.
-
-        values: {variable of the study: its value in this run}.
-        """
+        """Run `build` with {variable: value}; return its measures, or the reason for its failure."""
         began, log, log_filter = time.perf_counter(), logging.getLogger("formingx"), _RunLogFilter(values)
         log.addFilter(log_filter)
         try:
@@ -75,10 +72,7 @@ class Task(NamedTuple):
 
 
 class _RunLogFilter(logging.Filter):
-    """Log filter that adds the variables of a run to its log records and collects its warnings; for one thread.
-
-    `values` is {variable of the study: its value in this run}.
-    """
+    """Log filter for one thread that adds {variable of the study: value} to its records and collects warnings."""
 
     def __init__(self, values: dict[str, float]):
         super().__init__()
@@ -100,10 +94,7 @@ def as_text(numbers: Mapping[str, float]) -> str:
 
 
 def completed_runs(pool: Any, task: Task, cases: list[dict]) -> Iterator[StudyRun]:
-    """Run a task with sets of values, the first one alone, and yield all runs as they finish, also failed ones.
-
-    The pool is an executor of `concurrent.futures`.
-    """
+    """Run a task with sets of values in an executor, the first alone; yield runs as they finish, failed ones too."""
     for batch in (cases[:1], cases[1:]):
         jobs: dict[Any, dict] = {pool.submit(task, case): case for case in batch}
         for job in futures.as_completed(list(jobs)):

@@ -89,10 +89,7 @@ class ContactFace:
         return ContactTable(self.reference_points, points, gap, pressure, friction, path.problem.comm)
 
     def area_ratio(self, points: np.ndarray) -> np.ndarray:
-        """Return deformed over reference area at each contact point from deformed positions (n, 2), shape (n,).
-
-        A node that two edges share gets the mean of the ratios of both edges.
-        """
+        """Return deformed over reference area at contact points (n, 2), (n,), means of edges at shared nodes."""
         n, reference, now = len(points), self.reference_points[self._edges], points[self._edges]
         ratio = np.linalg.norm(_tangents(now), axis=-1) / np.linalg.norm(self._reference_tangents, axis=-1)
         if self._path.problem.scene.kinematics.dimension_of_volume == 3:

@@ -86,10 +86,7 @@ class Filling(ColumnTable):
 
 
 def filling(path: Any, contact: Any) -> Filling:
-    """Return the remaining gaps in the corners of a tool, state by state (`Path.filling`); collective.
-
-    A tool without a corner that the body must fill is an InputError.
-    """
+    """Return the gaps in a tool's corners, state by state (`Path.filling`), InputError without any; collective."""
     from ...contact.tooling import Tooling
     tooling = Tooling.of_problem(path.problem)
     number = path.problem.contacts.index(contact)

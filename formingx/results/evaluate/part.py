@@ -138,10 +138,7 @@ def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndar
 
 
 def _capacity(wall: Wall, inside: np.ndarray, axisymmetric: bool) -> float:
-    """Return the volume inside the inner face, length^3; in plane strain per depth.
-
-    `inside` is the fraction of each strip that belongs to the part, shape (n - 1,).
-    """
+    """Return the volume in the inner face, length^3 (plane strain: length^2); inside: share of strips (n - 1,)."""
     found = []
     for face in (wall.profile.bottom, wall.profile.top):
         slices = _sums(_up_to(refined(face)[:-1], refined(face)[1:], axisymmetric), len(wall.r)) * inside

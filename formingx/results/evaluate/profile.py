@@ -168,10 +168,7 @@ def whole_part(profile: Profile, planes: MirrorPlanes) -> Profile:
 
 
 def _joined_with_image(profile: Profile, plane: MirrorPlane, near: float) -> Profile:
-    """Return a profile joined with its mirror image; unchanged if neither an end nor a face lies in the plane.
-
-    `near` is the tolerance of positions, length.
-    """
+    """Return a profile joined with its image if an end or face lies within `near`, length, of the plane."""
     def image(points: np.ndarray) -> np.ndarray:
         """Return the mirror images of points, shape (n, 2), length."""
         unit = np.eye(2)[plane.axis]
@@ -206,10 +203,7 @@ def distance_to_line(points: np.ndarray, line: np.ndarray) -> np.ndarray:
 
 
 class Profiles:
-    """Computes the `Profile` of a sheet in states of one problem.
-
-    The mesh has the boundaries `bottom` and `top`, or `inner` and `outer`.
-    """
+    """Computes the `Profile` of a sheet with `bottom` and `top`, or `inner` and `outer`, in states of a problem."""
 
     def __init__(self, problem: Any):
         self._problem = problem

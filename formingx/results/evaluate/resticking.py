@@ -57,10 +57,7 @@ def furthest(path: Any) -> Resticking | None:
 
 
 def _shifts(contact: Any, touches: list[Any]) -> np.ndarray:
-    """Return the summed shifts of the sticking positions over tributary lengths of n owned points, (n,).
-
-    `touches` has the `ContactHistory` of these points in successive states.
-    """
+    """Return summed shifts of sticking positions of owned points, (n,), over tributary lengths, by histories."""
     last, total = np.full(contact.points.shape, np.nan), np.zeros(len(contact.points))
     stuck = np.zeros(len(total), dtype=bool)
     for history in touches:

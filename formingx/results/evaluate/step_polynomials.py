@@ -27,10 +27,7 @@ class Polynomial(NamedTuple):
 
 
 def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomial:
-    """Return the polynomial with values a, b at s = 0 and 1, and with slopes `start`, `end` there, if any.
-
-    It is a cubic with two slopes, a parabola with one, and a straight line without.
-    """
+    """Return the line, parabola or cubic with values a, b at s = 0 and 1 and none, one or two end slopes."""
     change = b - a
     if start is None and end is None:
         return Polynomial((a, change))

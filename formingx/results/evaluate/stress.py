@@ -217,10 +217,7 @@ class Stresses:
         return StressField(self, state)
 
     def locate(self, points: np.ndarray, layer: str) -> LocatedPoints:
-        """Return the cells of a layer that contain reference points (n, 2), length; collective.
-
-        The last result of each layer is stored. A point outside the layer is an InputError.
-        """
+        """Return cells of a layer with reference points (n, 2), length, stored, else an InputError; collective."""
         before = self._located.get(layer)
         if before is None or not np.array_equal(before[0], points):
             forms, positions = self.problem.forms, self.problem.followed(points)

@@ -110,10 +110,7 @@ class Walls:
         self._lines: tuple[list[str], Any] | None = None
 
     def evaluate(self, state: Any) -> Wall:
-        """Return the wall in a state; collective.
-
-        A body that is no sheet, or whose layers do not lie above each other, is an InputError.
-        """
+        """Return the wall in a state; no sheet, or layers not above each other, are an InputError; collective."""
         path, profile = self._path, self._path.profile(state)
         names = list(path.problem.scene.mesh.layers)
         shares = {names[0]: np.ones(len(profile.bottom))}
@@ -180,10 +177,7 @@ def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
 
 
 def _crossing(start: np.ndarray, direction: np.ndarray, pieces: np.ndarray) -> np.ndarray:
-    """Return s at which lines start + s direction, (n, 2) each, first meet pieces (m, 2, 2), shape (n,).
-
-    A line that meets no piece within 0 <= s <= 1 has nan.
-    """
+    """Return s, 0 to 1, where start + s direction, (n, 2), first meets pieces (m, 2, 2), (n,); nan for none."""
     a, edge = pieces[:, 0], pieces[:, 1] - pieces[:, 0]
     from_start = a - start[:, None]
     det = direction[:, None, 0] * edge[:, 1] - direction[:, None, 1] * edge[:, 0]

@@ -137,10 +137,7 @@ class EnergyBalance:
         return ({"jumps": b.jump.get("dissipated", 0.0)} if b.kind == "jump" else {}) | found
 
     def _body_energies(self, a: Any, b: Any) -> dict[str, float]:
-        """Return {load, tool, loss or other entry: energy added to the modelled body from state a to state b}.
-
-        The energy lost in a snap-through is not included.
-        """
+        """Return {load, tool, loss, ...: energy added to the modelled body from a to b}, without snap-throughs."""
         found: dict[str, float] = {}
         if b.kind != "jump" and any(c.law.has_friction for c in self._problem.contacts):
             found["friction"] = self._friction(a, b)

@@ -8,10 +8,7 @@ _KEY, _TYPES = "array", ("<f8", "<i8", "|b1")
 
 
 def pack(data: Any) -> tuple[Any, bytes]:
-    """Split data into JSON data and the bytes of its arrays; `unpack` is the inverse.
-
-    An array becomes {"array": [position of its first byte, type, shape]}; the bytes are little-endian and in order.
-    """
+    """Split data into JSON, {"array": [first byte, type, shape]}, and little-endian bytes for `unpack`."""
     found: list[bytes] = []
     end = 0
 
@@ -31,10 +28,7 @@ def pack(data: Any) -> tuple[Any, bytes]:
 
 
 def unpack(data: Any, content: bytes) -> Any:
-    """Return the data that `pack` split; its arrays are read-only.
-
-    An array of unknown type, or outside `content`, raises a ValueError.
-    """
+    """Return the data of `pack` with read-only arrays; an unknown type or place is a ValueError."""
     if isinstance(data, list):
         return [unpack(value, content) for value in data]
     if not isinstance(data, dict):

@@ -67,10 +67,7 @@ class Checkpoint:
         self._n_written = self._begin()                         # states in the folder
 
     def write(self) -> None:
-        """Write the states of the path that the folder does not contain yet; collective.
-
-        An OSError, as of a full disk, keeps all earlier states.
-        """
+        """Write new states of the path; an OSError, as of a full disk, keeps all earlier states; collective."""
         path, first = self._path, self._n_written
         with progress(self._comm, f"{self.folder}: {len(path) - first} states") as done:
             for number in range(first, len(path)):
@@ -234,10 +231,7 @@ def _read_state(data: dict, problem: Any) -> State:
 
 
 def _by_cell(space: Any, owned: np.ndarray) -> np.ndarray:
-    """Return the unknowns of each cell on rank 0 in the order of the script, from owned ones; collective.
-
-    The shape is (cells, unknowns per cell), and empty on other ranks.
-    """
+    """Return cells' unknowns (cells, k) in the order of the script on rank 0, from owned ones; collective."""
     topology, w = space.mesh.topology, fem.Function(space)
     cells, n = topology.index_map(topology.dim).size_local, space.dofmap.index_map.size_local
     w.x.array[:n] = owned[:n]

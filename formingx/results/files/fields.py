@@ -111,10 +111,7 @@ class Fields:
         return expression.eval(self._problem.forms.domain, self._cells).reshape(len(self._cells), -1, self._components)
 
     def _contact_pressure(self, state: Any) -> np.ndarray:
-        """Return the contact pressure at the nodes of each cell in a state, shape (cells, nodes), stress.
-
-        It is 0 away from tools. Collective.
-        """
+        """Return pressure at the nodes of cells, (cells, nodes), stress, 0 away from tools; collective."""
         pressure = np.zeros(self.points.shape[:2])
         for k, contact in enumerate(self._problem.contacts):
             if k not in self._faces:

@@ -71,10 +71,7 @@ def versions() -> dict[str, str]:
 
 
 def on_root(comm: Any, action: Callable[[], Any]) -> Any:
-    """Call a function on rank 0 alone, and return its result on all ranks; collective.
-
-    An error of the function is raised on all ranks.
-    """
+    """Call a function on rank 0 alone, and return its result, or raise its error, on all ranks; collective."""
     result, error = None, None
     if comm.rank == 0:
         try:

@@ -21,10 +21,7 @@ from .report_data import progress
 
 
 def between(record: Any, a: Any, b: Any, fraction: float) -> Any:
-    """Return the state at a fraction from a state to the next, on the cubic through both; it is not in equilibrium.
-
-    If `b` begins another stage, it is `b`.
-    """
+    """Return the state at a fraction on the cubic to the next, not in equilibrium; `b` if it begins a stage."""
     if a.setting != b.setting:
         return b
     x, control = record.segment(b).curve.interpolate(a, b, fraction)

@@ -20,10 +20,7 @@ class Attempts:
         self.findings: list[Finding] = []
 
     def make(self, name: str, draw: Callable[[], Any], fallback: Any) -> Any:
-        """Return the result of `draw`, or a fallback if it fails.
-
-        The error becomes a finding on `name`, such as "the picture".
-        """
+        """Return the result of `draw`, or a fallback if it fails: a finding on `name`, such as "the picture"."""
         try:
             return draw()
         except self._refusals:

@@ -68,10 +68,7 @@ def _finite_of(draw: Callable[[], Any]) -> Any:
 
 
 def _run(record: ReportData, name: str, units: Units, attempts: Attempts) -> dict[str, Any]:
-    """Return the data of one run for `report.js` as a dictionary.
-
-    It holds the stages, and for each drawn state the main columns, the tools and the sheet.
-    """
+    """Return one run's data for `report.js`: stages, and main columns, tools and sheet in each drawn state."""
     progress, frames = record.progress, record.frames
     stages = [{"name": words(record.stages[a]), "from": float(progress[a]), "to": float(progress[b - 1])}
               for a, b in record.stage_ranges]
@@ -163,10 +160,7 @@ def _loading(records: list[ReportData], names: list[str], units: Units) -> list[
 
 
 def _driven(record: ReportData, stage: slice) -> list[tuple[str, str, np.ndarray, np.ndarray]]:
-    """Return a loading curve for each travel and each pressure that changes in a stage.
-
-    It has the names of x and y, and their values in the n states, (n,) each.
-    """
+    """Return (name of x, name of y, x, y), (n,) each, for each travel and pressure that changes in a stage."""
     found, measures = [], record.measures
     for column, values in measures.items():
         if np.ptp(values[stage]) <= 1e-9 * (np.ptp(values) or 1.0):
@@ -264,10 +258,7 @@ def _walls(records: list[ReportData], names: list[str], units: Units) -> list[di
 
 
 def chart(title: str, x: str, y: str, traces: list[dict], zero: str = "", equal: bool = False) -> dict[str, Any] | None:
-    """Return a chart as data for `report.js`; None without curves.
-
-    "x" or "y" in `zero` makes that axis begin at 0; with `equal` both axes have the same scale.
-    """
+    """Return a chart for `report.js`, None without curves; zero: axes ("x", "y") from 0; equal: one scale."""
     if not traces:
         return None
     return {"title": title, "x": x, "y": y, "zero": zero, **({"equal": True} if equal else {}),

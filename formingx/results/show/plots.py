@@ -57,10 +57,7 @@ def main_columns(columns: list[str]) -> tuple[str, str]:
 
 
 def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
-    """Draw the section of a deformed sheet as coloured strips between its two faces.
-
-    `scale` multiplies r and z; colours at the nodes are (red, green, blue, opacity) from 0 to 1, shape (n, 4).
-    """
+    """Draw a deformed section, times `scale`, as strips between its faces; colours at nodes: RGBA, (n, 4)."""
     import numpy as np
     from matplotlib.collections import PolyCollection
     rows = profile.through_wall() * scale
@@ -71,10 +68,7 @@ def section(axes: Any, profile: Any, scale: Any, colours: Any) -> None:
 
 
 def span(profiles: Any, mirrored: bool = False) -> tuple[Any, Any]:
-    """Return the lower left and upper right corner (r, z) of a box around sheets, length, with 6 % margin.
-
-    `mirrored` includes the mirror images at r = 0.
-    """
+    """Return corners (r, z) of a box around sheets, with mirror images at r = 0 if wanted, 6 % margin, length."""
     import numpy as np
     points = np.vstack([profile.outline for profile in profiles])
     low, high = points.min(0), points.max(0)

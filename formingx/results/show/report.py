@@ -88,10 +88,7 @@ def write(records: ReportData | list[ReportData], file: Any, title: str, failure
 
 
 def _part(record: ReportData, units: Units, density: float | None, trim: Any) -> Part | None:
-    """Return the key numbers of the part in the last state of a run, or None for no sheet in a section.
-
-    A density (g/cm3) or a trim without a part is an InputError.
-    """
+    """Return the key numbers of a section's last state, else None or, with density or trim, an InputError."""
     if record.profiles[-1] is None:
         if density is not None or trim is not None:
             raise InputError(f"report: {'density' if density is not None else 'trim'}: "
@@ -189,10 +186,7 @@ def _details(record: ReportData, units: Units, attempts: Attempts) -> list[str]:
 
 
 def _warnings(record: ReportData, lead: str = "") -> str:
-    """Return the findings on a run as HTML, or a sentence that there are none.
-
-    The page shows two lines of each, after the text `lead`, and the whole after a click.
-    """
+    """Return findings on a run, or that there are none, as HTML: two lines, after `lead`, the rest by a click."""
     findings = record.all_findings()
     if record.space:
         lead = f"<p class=note>{html.escape(lead)}Only curves and inputs are shown: {_NO_MESH}.</p>"

@@ -269,10 +269,7 @@ def _fields_of(path: Any, drawn: Any, last: Profile, done: Callable[[float], Any
 
 
 def of_checkpoint(about: dict, states: list[dict]) -> ReportData:
-    """Return the data of a run for its report from its checkpoint, without the scene.
-
-    Both arguments are results of `formingx.results.files.checkpoint_data.contents`.
-    """
+    """Return the report data of a run without its scene from `checkpoint_data.contents`."""
     stepping: dict = next((s["stepping"] for s in reversed(states) if s["stepping"]), {})
     ended = about.get("ended") or {"findings": (), "failure": ""}
     tooling = Tooling.of_description(about["scene"])

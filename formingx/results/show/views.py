@@ -198,10 +198,7 @@ _WINDOW = "VTK_DEFAULT_OPENGL_WINDOW"
 
 @functools.cache
 def _window_without_screen() -> str | None:
-    """Return the kind of window that VTK draws here without a display, or None.
-
-    Another process tries, because VTK crashes where it cannot draw.
-    """
+    """Return the kind of window VTK draws here without a display, or None; another process tries, as VTK crashes."""
     script = ("import vtkmodules.vtkRenderingOpenGL2; from vtkmodules.vtkRenderingCore import vtkRenderWindow;"
               "w = vtkRenderWindow(); w.SetOffScreenRendering(1); w.SetSize(8, 8); w.Render()")
     for window in (os.environ.get(_WINDOW, "vtkEGLRenderWindow"), "vtkOSOpenGLRenderWindow"):

@@ -59,10 +59,7 @@ class ColumnTemperature:
         return np.clip(np.einsum("qa,can->cqn", shapes, corners), *self.limits)
 
     def at_points(self, points: np.ndarray, depth: np.ndarray | None = None) -> np.ndarray:
-        """Return the temperatures at reference points, shape (n, 2 or 3), and depths from 0 to 1; collective.
-
-        depth: shape () or (n,); None: 0.5.
-        """
+        """Return temperatures at reference points (n, 2 or 3), depths 0 to 1, () or (n,), None: 0.5; collective."""
         points = np.asarray(points, dtype=float)
         at = np.broadcast_to(0.5 if depth is None else depth, len(points))
         if self.sheet.comm.size == 1:                        # all nodes need no search in the triangles
