@@ -45,8 +45,7 @@ class _WrongCall(InputError, TypeError):
 def explain(module: types.ModuleType) -> None:
     """Make the public functions and classes of a module, and their methods, explain calls with wrong arguments.
 
-    A call that fails then raises an `InputError` that names the wrong argument and its type. The functions of `module`,
-    a module of the package, are replaced.
+    It raises an `InputError` that names the wrong argument and its type. The functions of `module` are replaced.
     """
     for name, item in list(vars(module).items()):
         if name.startswith("_") or not getattr(item, "__module__", "").startswith(_PACKAGE):

@@ -118,8 +118,7 @@ def first_path(caller: str, resume: bool, checkpoint: Any, scene: Scene, start: 
                plans: Sequence[Plan] = ()) -> Any:
     """Return the path that a run continues: `start`, or with `resume` the path in the checkpoint, or None.
 
-    caller: name of the calling function, for messages. Raise `InputError` if `resume` is given with `start`, or without
-    a checkpoint, or for other stages.
+    InputError: `resume` with `start`, without a checkpoint, or for other stages; `caller`: for the message.
     """
     if not resume:
         return start

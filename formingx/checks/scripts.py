@@ -28,8 +28,7 @@ class _DryRun(BaseException):
 def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
     """Return the findings on the first scene that a Python script runs; nothing is solved.
 
-    The code before its first run is executed, calls of `formingx.heat` included. A missing file, a script without a
-    run, or a refused scene is an InputError.
+    The code before its first run is executed. A missing file or run, or a refused scene, is an InputError.
     """
     file = file_path("check: script", script)
     if not file.is_file():

@@ -147,8 +147,7 @@ class PressurisedFace:
     def mould_points(self) -> tuple[np.ndarray, np.ndarray]:
         """Points of the opposite face, and the points at which they would meet the tools, shape (n, 2) each, length.
 
-        Each point is moved along the normal of the sheet, away from the face under pressure. If it meets no tool, its
-        row in the second array is infinite.
+        They move along the normal, away from the face under pressure, to infinity if they meet no tool.
         """
         points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
         points, directions = outward_directions(points, self.line)
@@ -228,8 +227,7 @@ def _limit_pressures(body: SizedBody) -> Found:
 def _blow_ratio(body: SizedBody) -> Found:
     """Report a tube that is blown into a mould that is too wide for it.
 
-    Its radius grows more than 8-fold, or the estimated pressure of a uniform tube falls below 0.8 times its maximum on
-    the way to the mould, so that it bulges locally.
+    Its radius grows over 8-fold, or a uniform tube falls below 0.8 times its largest pressure: it bulges locally.
     """
     for face in body.pressurised_faces:
         if not (face.tools and face.tall and face.axisymmetric):
@@ -256,8 +254,7 @@ def _blow_ratio(body: SizedBody) -> Found:
 def _open_moulds(body: SizedBody) -> Found:
     """Report an open mould: parts of the sheet meet no tool along their normal, and would be blown past its end.
 
-    For this a pressure of the run is larger than a free sheet bears, or the mould is deep and no target ends the
-    run.
+    A pressure of the run is larger than a free sheet bears, or the mould is deep and no target ends the run.
     """
     for face in body.pressurised_faces:
         if not face.tools:
@@ -353,8 +350,7 @@ def _gaps(faces: list[tuple[Tool, np.ndarray]], direction: Any, start: float, tr
           tolerance: float) -> np.ndarray:
     """Return the smallest gap between tools and undeformed faces at n increasing travels, shape (n,), length.
 
-    The travel grows by half the gap, at least `tolerance`, to the first touch or `travel_range`. Faces are (tool, nodes
-    (n, c)).
+    The travel grows by half the gap, or `tolerance`, to the first touch or the range. Faces: (tool, nodes (n, c)).
     """
     travel, gaps, speed = 0.0, [start], float(np.linalg.norm(direction))
     while travel < travel_range and (len(gaps) == 1 or gaps[-1] > min(tolerance, start)):

@@ -241,8 +241,7 @@ class ThickBody:
     def _integrate(self, rate: Callable, start: np.ndarray, times: Any) -> np.ndarray:
         """Return the solution of an initial value problem at n times, shape (n, k), and update the present time.
 
-        `rate` maps (time, solution) to derivatives, (k,). A solution that ends before the last time is an
-        InputError.
+        `rate` maps (time, solution) to derivatives, (k,). An end before the last time is an InputError.
         """
         from scipy.integrate import solve_ivp
         found = solve_ivp(rate, (self.time, times[-1]), start, method="DOP853", t_eval=times, **_TOLERANCES)

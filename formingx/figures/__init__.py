@@ -43,8 +43,7 @@ def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: An
 def new_axes() -> Any:
     """Return the axes of a new figure with one plot.
 
-    If the script uses `matplotlib.pyplot`, the figure is its current one (`plt.gcf()`); not in a notebook, which shows
-    the returned axes.
+    It is the current figure of `matplotlib.pyplot` if the script uses that, not in a notebook, which shows axes.
     """
     pyplot = sys.modules.get("matplotlib.pyplot")
     drawing, axes = figure()
@@ -83,8 +82,7 @@ class _LoadedWhenUsed(types.ModuleType):
 def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> None:
     """Draw the sections of rigid tools in grey, within a box from `low` to `high`, (r, z), length.
 
-    placed: (`Tool`, its displacement (r, z), length) of each. mirror: True to draw their mirror images at r = 0,
-    too.
+    placed: (`Tool`, its displacement (r, z), length) of each. mirror: with their images at r = 0, too.
     """
     box = np.array([low, high], dtype=float)
     n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)

@@ -11,8 +11,7 @@ from . import tools as draw_tools
 def draw_volume_ratios(elements: Any, marks: list, tools: list, title: str, file: Any) -> None:
     """Write a picture of deformed elements, coloured by the volume ratio J, with marked points and tools.
 
-    marks: list of (label, deformed position). tools: list of (tool, its displacement). file: name of the picture; its
-    ending is the format.
+    marks: (label, deformed position); tools: (tool, its displacement). The ending of `file` is the format.
     """
     from matplotlib.collections import PolyCollection
     size = np.ptp(elements.outline, axis=(0, 1))

@@ -366,8 +366,7 @@ class Formulation(ABC):
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
         """Return the heights at which functions of the position are evaluated in a layer, shape (n,), length.
 
-        For a solid they are Z. For a membrane, the mid-surface of all layers, they lie halfway between the layer's
-        faces.
+        For a solid they are Z, for a membrane, the mid-surface of all layers, halfway between the layer's faces.
         """
 
     @abstractmethod

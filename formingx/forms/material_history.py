@@ -114,8 +114,7 @@ class MaterialHistory:
                  mapping: Callable[[np.ndarray], np.ndarray]) -> InternalVariables:
         """Interpolate the internal variables `variables` of `source`, on another mesh, to this mesh; collective.
 
-        The forms of both problems must be set to the state. mapping: function from reference points of the other mesh,
-        shape (n, coordinates), to points of this mesh.
+        Both problems' forms must be in the state. mapping: points of the other mesh, (n, coordinates), to this one.
         """
         interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
         shapes = self._terms.material.tensor_powers

@@ -87,8 +87,7 @@ class Outline:
     def self_intersection(self, edges: np.ndarray) -> np.ndarray | None:
         """Return a point where deformed edges, shape (m, 3, 2), length, cross, shape (2,), length; else None.
 
-        Crossings of edges with a common neighbour are ignored: an element that bends over a sharp edge makes a
-        crease.
+        Edges with a common neighbour may cross: an element that bends over a sharp edge makes a crease.
         """
         if crossing_point(*self.pieces(edges, 2)) is None:        # chords may cross where the curves do not
             return None

@@ -93,8 +93,7 @@ class Probe:
     def _row(self, factors: np.ndarray, point_weights: np.ndarray) -> np.ndarray:
         """Return the row of a weighted sum of displacements of points, locally owned entries.
 
-        factors: of all n points, shape (n, components). point_weights: shape functions at the m points in cells of this
-        rank, shape (m, dim).
+        factors: of all n points, (n, components). point_weights: shape functions at the m points here, (m, dim).
         """
         problem = self._problem
         index_map = problem.forms.space.dofmap.index_map
@@ -117,8 +116,7 @@ class Probe:
 class MidSurfaceProbe(Probe):
     """Evaluation of the displacement of a membrane at fixed reference points through its thickness.
 
-    Points off the mid-surface stay on the normal of their mid-surface point. Their distance from the mid-surface
-    changes in proportion to the thickness.
+    Points stay on the normal of their mid-surface point, at distances in proportion to the thickness.
     """
 
     def __init__(self, problem: Any, points: np.ndarray):

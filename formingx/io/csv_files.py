@@ -37,8 +37,7 @@ class CsvTable(NamedTuple):
     def take(self, column: str, requested: float | str | None = None) -> np.ndarray:
         """Return the values of a column, shape (n,), converted to a unit or multiplied by a factor.
 
-        None keeps the values of a column without unit. A missing column, a cell that is no finite number, or a wrong
-        unit is an InputError.
+        None keeps a column without unit. No column, no finite number, or a wrong unit is an InputError.
         """
         check_name(f"{self.name}: column", column, self.columns)
         values, unit = self.columns[column], self.units[column]

@@ -55,8 +55,7 @@ def _shift(material: Any, temperature: float) -> float:
 def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str) -> list[tuple[str, str]]:
     """Return rows (quantity, value) of a table for a material at one temperature: moduli and limits of stretch.
 
-    `name` is the temperature as text, or "". `shift` is the factor of the relaxation times at this temperature. `unit`
-    and `unit_of_time` are the units of stress and time.
+    `name`: the temperature, or ""; `shift`: factor of the relaxation times at it; units: of stress and time.
     """
     def with_unit(value: float, symbol: str = "") -> str:
         return f"{value:.4g} {symbol}".rstrip()
@@ -86,8 +85,7 @@ def _limits(name: str, material: Any, shift: float, unit: str, unit_of_time: str
 def _picture(cases: list[tuple[str, Any, float]], rates: list[float], unit: str, unit_of_time: str) -> str:
     """Return a PNG image, base64-encoded, with true stress over stretch in three tests.
 
-    Cases are (temperature as text, material, factor of relaxation times); rates are Hencky rates, 1/time, none without
-    relaxation.
+    Cases: (temperature as text, material, factor of relaxation times); rates: Hencky, 1/time, if it relaxes.
     """
     drawn, axes = figure(3, width=4.2)
     for axis, mode in zip(axes, MODES):

@@ -29,8 +29,7 @@ class Peak(NamedTuple):
 class FreeInflation:
     """Free inflation of a thin tube or disc of incompressible layers.
 
-    Layers are (material, reference thickness in units of length) with constants that are numbers; the radius is the
-    mean of the tube or that of the opening, length.
+    Layers: (material with constant numbers, reference thickness, length); radius: of the tube or the opening.
     """
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):

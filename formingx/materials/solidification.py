@@ -198,8 +198,7 @@ class Solidification(Material):
     def _begin(self, internal: dict[str, Any], constants: dict[str, Any]) -> tuple[Any, Any, Any]:
         """Return A and the solidified fraction phi at the beginning of a step, and phi at its end (UFL).
 
-        A, entries (11, 22, 12, 33), is the integral of C^-1 over the solidified fraction, that of the previous step
-        included.
+        A, (11, 22, 12, 33), is the integral of C^-1 over the solidified fraction, with that of the previous step.
         """
         end, before = ufl.ln(constants["set_end"]), internal[_FRACTION]
         begin, end = (ufl.max_value(ufl.min_value(phi, 1.0), 0.0)

@@ -36,8 +36,7 @@ class _Scalar(_Recorded):
 class _Nodal(_Recorded):
     """Sum or maximum over the active contacts of a quantity of each contact; 0 if no contact is active.
 
-    `quantity` is a function of a contact, the locally owned unknowns and the control. `reduce` is `sum` or `max`.
-    `contacts` None means all contacts of the problem.
+    `quantity`: function of a contact, owned unknowns, control; `reduce`: sum or max; `contacts`: None for all.
     """
 
     def __init__(self, problem, quantity, reduce, contacts=None):

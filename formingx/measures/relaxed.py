@@ -50,8 +50,7 @@ class PoleStressRatio:
     def evaluate(self) -> float:
         """Return the present Mises stress at the pole over the relaxed one; collective.
 
-        If the relaxed stress is 0, a small equibiaxial strain is added, so an undeformed body has the ratio of
-        moduli.
+        A relaxed stress of 0 gets a small equibiaxial strain: an undeformed body has the ratio of moduli.
         """
         stored, relaxed, modulus = self._integrals()
         if relaxed < ROUND_OFF * modulus:
@@ -63,8 +62,7 @@ class PoleStressRatio:
     def _integrals(self) -> np.ndarray:
         """Return the integrals of three stresses over the elements at the pole.
 
-        These are the present Mises stress, the Mises stress after complete relaxation, and the largest shear modulus of
-        the materials. The result has the shape (3,) and is equal on all ranks; collective.
+        They are the present and the relaxed Mises stress, and the largest shear modulus, on all ranks; collective.
         """
         totals = np.zeros(3)
         for expression, cells in self._parts:

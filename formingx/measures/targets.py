@@ -53,8 +53,7 @@ class Amplitude(Quantity):
     def equation(self, target):
         """Return the equation, linear in the control, that this quantity equals a target in the user's units.
 
-        It sets a PETSc vector to dc/dx = 0, and returns the dimensionless residual c and its derivative by the
-        control.
+        It sets dc/dx = 0, and returns the dimensionless residual c and its derivative by the control.
         """
         setting = self._problem.setting
         slope = 1.0 if self._number is None else setting.rate[self._number]
@@ -303,8 +302,7 @@ def bind_volume(problem: Any, form: Any = None) -> Quantity:
 def _volume(problem: Any, form: Any = None) -> Quantity:
     """Return the volume swept by the loaded face of the modelled body as an output quantity.
 
-    On a remeshed body it includes the volume that the face swept on earlier meshes. `form` is the integral, the result
-    of `swept_volume`; None to build it.
+    It includes the volume swept on earlier meshes. `form`: result of `swept_volume`; None to build it.
     """
     earlier = 0.0
     if problem.scene.state_transfer is not None:

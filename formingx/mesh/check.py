@@ -17,8 +17,7 @@ _C = CFunctions("mesh/check.c")
 def check_elements(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
     """Raise an InputError, with the position, for invalid triangles in the reference configuration.
 
-    Nodes have shape (n, 2), length, triangles (m, 3 or 6). Elements must be finite, not inverted, not overlapping, and
-    in one piece.
+    Nodes (n, 2), length, triangles (m, 3 or 6) must be finite, not inverted or overlapping, in one piece.
     """
     bad = np.flatnonzero(~np.isfinite(points).all(1))
     if len(bad):
@@ -102,8 +101,7 @@ def inverted(nodes: np.ndarray) -> np.ndarray:
 def _outline(points: np.ndarray, triangles: np.ndarray, turn: np.ndarray, what: str) -> np.ndarray:
     """Return the edges of the outline, which belong to one element only, as node numbers, shape (k, 2).
 
-    `turn` is 1 for counter-clockwise triangles, (m, 3), else -1. Two elements on the same side of an edge are an
-    InputError.
+    `turn` is 1 for counter-clockwise triangles, (m, 3), else -1. Two on one side of an edge are an InputError.
     """
     directed, edges, numbers, times = edges_of(triangles)
     side = np.where(directed[:, 0] < directed[:, 1], 1, -1) * np.tile(turn, 3)           # side of the element

@@ -16,8 +16,7 @@ Thickness = float | Callable[[float], float] | Mapping[float, float]
 def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) -> dict[str, Callable]:
     """Return {layer: function of coordinates (n,), that returns its thickness, shape (n,), length}.
 
-    `thickness` is a length, function or table, or {layer: such}; `coordinate` is "R", "Z", or "" if it must be
-    constant. Other values are an InputError.
+    `thickness`: length, function, table or {layer: such} over the coordinate "R", "Z", or "" for constant ones.
     """
     named = isinstance(thickness, Mapping) and all(isinstance(name, str) for name in thickness)
     layers = dict(thickness) if named else {alone: thickness}
@@ -29,8 +28,7 @@ def layer_thicknesses(kind: str, thickness: Any, alone: str, coordinate: str) ->
 def _thickness(caller: str, given: Any, coordinate: str) -> Callable[[np.ndarray], np.ndarray]:
     """Return the thickness of a layer as a function of coordinates, shape (n,), with values of this shape, length.
 
-    `given` is a length, function or table {coordinate: length}. An InputError, also of the function, reports a value
-    that is missing or not positive.
+    `given`: length, function or table {coordinate: length}. A value missing or not positive is an InputError.
     """
     if not coordinate or not (callable(given) or isinstance(given, Mapping)):
         value = positive(caller, given)

@@ -100,8 +100,7 @@ def content(file: str | os.PathLike) -> Content:
 def read(file: str | os.PathLike) -> Grid:
     """Return the grid in a gmsh file; physical groups name the layers (dimension 2) and the boundaries (dimension 1).
 
-    A damaged file, no group of dimension 2, elements other than triangles, or ones out of the plane are an
-    InputError.
+    Damage, no group of dimension 2, elements other than triangles or out of the plane are an InputError.
     """
     file = os.fspath(file)
     found = content(file)
@@ -156,8 +155,7 @@ def write(grid: Grid, file: str | os.PathLike) -> None:
 def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray, file: str) -> dict[str, np.ndarray]:
     """Return {name of a physical group: its elements, (m, nodes)} for one dimension.
 
-    Elements are indices into the sorted node `numbers`, (n,). Another type than in `kinds`, {gmsh type: nodes}, or a
-    missing node is an InputError.
+    Elements are indices into sorted `numbers`, (n,). A type not in `kinds`, or a missing node, is an InputError.
     """
     parts: dict[str, list[np.ndarray]] = {}
     what = "triangles" if dim == 2 else "edges"

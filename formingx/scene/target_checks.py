@@ -28,8 +28,7 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
                 continues: bool = False) -> str | None:
     """Return the reason why no run of a scene can reach a target, or None.
 
-    A stage leaves out `inactive` items (numbers in `Scene.items`), None for a run of `trace`; a run that `continues`
-    may withdraw a tool.
+    inactive: numbers in `Scene.items`, None: a run of `trace`; a run that `continues` may withdraw a tool.
     """
     name, value, driven = target.name, target.value, scene.driven
     active = [item for i, item in enumerate(scene.items) if i not in (inactive or ())]
@@ -141,8 +140,7 @@ def _pole_in_tool(scene: Scene, contact: Any, height: float) -> bool:
 def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
     """Return the volume between a body and its mould by squares of a grid, and an upper bound over it.
 
-    The volume, length^3 or length^2, is infinite in an open mould. For a flat body, squares next to the body and
-    outside the tool count.
+    Both, length^3 or length^2, are infinite in an open mould. Squares next to a flat body, outside the tool, count.
     """
     from scipy.ndimage import binary_dilation, label
     face = scene.mesh.nodes_of(contact.on)
@@ -172,8 +170,7 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
 def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
     """Return the volume between a tube, closed below, and its mould, up to the upper end of the tube, length^3.
 
-    It is infinite if the mould is open. The volume that the outer face `line`, (n, 2), length, encloses does not
-    count.
+    It is infinite if the mould is open. The volume within the outer face `line`, (n, 2), does not count.
     """
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]

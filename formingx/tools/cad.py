@@ -96,8 +96,7 @@ def _of_curve(evaluate: Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], b
               tolerance: float | None, name: str) -> Callable[[], list[Line | Arc]]:
     """Return a function that returns the lines and arcs of a curve, or raises the error of their computation.
 
-    `evaluate` maps parameters (n,) within `bounds` to points and derivatives, (n, 3) each. Without a tolerance the
-    curve must be a line or an arc.
+    `evaluate`: parameters (n,) to points and derivatives, (n, 3) each. Without tolerance: lines and arcs only.
     """
     low, high = bounds
 

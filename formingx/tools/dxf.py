@@ -50,8 +50,7 @@ def _check_counts(expected: Counter, found: Counter) -> None:
 def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
     """Return the lines and arcs of a curve of ezdxf.
 
-    A damaged or unsupported curve is an InputError with its name; without `tolerance`, length, so are splines and
-    ellipses.
+    A damaged or unsupported curve, or a spline or ellipse without `tolerance`, is an InputError by name.
     """
     try:
         return _read(entity, tolerance, name)

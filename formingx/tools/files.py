@@ -112,8 +112,7 @@ def _directed(pieces: list[Line | Arc], tag: int) -> list[Line | Arc]:
 def _end_to_end(curves: list[list[Line | Arc]], file: str) -> tuple[list[Line | Arc], bool]:
     """Return the pieces of all curves in order along the profile, and True if the profile is closed.
 
-    An open profile begins at a free end; curves are reversed where necessary. Curves that form no line are an
-    InputError.
+    An open profile begins at a free end; curves are reversed where needed. No single line is an InputError.
     """
     from scipy.spatial import cKDTree
     curves = [pieces for pieces in curves if pieces]

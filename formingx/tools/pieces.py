@@ -129,8 +129,7 @@ def with_polyline(pieces: tuple[Line | Arc, ...], points: np.ndarray, radii: lis
                   ) -> list[Line | Arc]:
     """Return a profile whose part between two places is replaced by a polyline with fillets (`Tool.with_piece`).
 
-    `points`, shape (n, 2), and `radii` are corners (R, Z) and fillets of the polyline, `size` is the size of the
-    profile; lengths.
+    points, shape (n, 2), and radii: corners (R, Z) and fillets; size: of the profile; lengths.
     """
     first, last = (_places(pieces, point, size) for point in (points[0], points[-1]))
     if first[0] > last[0]:

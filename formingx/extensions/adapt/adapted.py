@@ -107,8 +107,7 @@ def checked_columns(mesh: Mesh) -> Columns:
 def _new_ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
     """Return coordinates of the ends of k new columns along the sheet, such as radii of a disc, shape (k + 1,).
 
-    The n columns become longer by `factors`, shape (n,); inf is the longest column. Too many new columns are an
-    InputError.
+    The n columns become longer by `factors`, (n,); inf is the longest. Too many new columns are an InputError.
     """
     old = columns.ends
     fractions = np.arange(_COLUMN_SAMPLES) / _COLUMN_SAMPLES

@@ -17,8 +17,7 @@ _MIN_SIZE_RATIO = 0.25
 def required_sizes(path: Any, max_rotation: float | None, error: float | None) -> tuple[np.ndarray, np.ndarray]:
     """Return positions of the nodes of the flat sheet, shape (n, 2), and the required sizes, shape (n,), length.
 
-    Each limit reduces the size in each state, None does not: rotation (radians) and relative wall change between
-    neighbouring triangles.
+    Each limit that is not None reduces them in each state: rotation (radians), relative wall change over an edge.
     """
     factor: np.ndarray = np.ones(0)
     for state in path.states:

@@ -294,8 +294,7 @@ def _table(side: str, given: Any) -> csv_files.CsvTable:
 def _columns(left: csv_files.CsvTable, right: csv_files.CsvTable, given: Any) -> dict[str, str]:
     """Return the columns to compare, {our name: their name}, checked.
 
-    `given` is the argument of `compare`; None for the first two columns of equal name, and for walls the first one and
-    "wall".
+    `given` is the argument of `compare`; None: the first two columns of equal name, for walls the first and "wall".
     """
     if given is None:
         shared = [c for c in left.columns if c in right.columns and c != "iterations"]
@@ -349,8 +348,7 @@ def _largest_slope(points: np.ndarray, k: int) -> float:
 def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Difference:
     """Return the difference of one column between two curves, with its maximum and root mean square.
 
-    Values have shape (k,). Partners, (k, c) in units of ranges, weight the mean by arc length; `size` is the range of
-    the column.
+    Values have shape (k,). Partners, (k, c) in units of ranges, weight the mean by arc length; `size` is the range.
     """
     s = arc_length(partners)
     weights = np.ones(len(s))

@@ -93,8 +93,7 @@ def pair_at_equal_values(points: np.ndarray, curve: np.ndarray, k: int) -> tuple
 def resolution_of(points: np.ndarray, k: int | None) -> float:
     """Return the largest error of a curve if every second point is interpolated from the others, dimensionless.
 
-    Points have shape (n, c). The error is that of columns at equal column k, or with None the distance; infinite below
-    five points.
+    Points have shape (n, c). The error is that at equal column k, None: the distance; infinite below five points.
     """
     if len(points) < 5:
         return float("inf")

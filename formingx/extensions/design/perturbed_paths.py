@@ -107,8 +107,7 @@ class _PerturbedPaths:
     def _begin_stage(self, setting: StepData) -> None:
         """Begin a stage, or a piece of a stage, in each perturbed run.
 
-        Piece 0 of a stage is the change from the stage before; a stage in time has a piece between successive knots of
-        its amplitudes.
+        Piece 0 is the change from the stage before; then one follows between successive knots of its amplitudes.
         """
         for run in self.runs:
             problem, p = run.problem, run.plans[setting.stage]
@@ -170,8 +169,7 @@ class _PerturbedPaths:
     def _close_gaps(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
         """Move points of the perturbed runs whose gap closes in a step to their positions of gap closure.
 
-        Returns the mask of those that close at the end of the step, shape (n,), for the n points of contact face
-        `number`.
+        Return the mask of those that close at its end, shape (n,), for the n points of contact face `number`.
         """
         history, law, n = face.history, face.law, self.problem.n_owned
         no_points = np.zeros(len(face.points), dtype=bool)
@@ -196,8 +194,7 @@ class _PerturbedPaths:
     def _copy_contact_status(self, state: State) -> None:
         """Copy the contact status of the base run at a state to the perturbed runs.
 
-        Points whose gap closed at the end of the step are projected onto the tool of the perturbed run, along the
-        velocity of the base run.
+        Points that closed at the end of the step move along the base run's velocity onto the perturbed run's tool.
         """
         n = self.problem.n_owned
         for number, face in enumerate(self.problem.contacts):
@@ -226,8 +223,7 @@ class _PerturbedPaths:
     def _equations(self, state: State, last: bool) -> tuple[Any, list[Any]]:
         """Return the constraints that determine at which point of its path each run is compared.
 
-        The first is None for the plane normal to the path; `last` says that a stage or a piece of a stage ends at the
-        state.
+        The first is None for the plane normal to the path; `last`: a stage or a piece of it ends at the state.
         """
         setting = self.problem.setting
         if not last:
@@ -273,8 +269,7 @@ class _PerturbedPaths:
 def _gap_constraint(problem: Any, face: Any, point: int | None, with_gradient: bool) -> Any:
     """Return a constraint of (x, control, gradient) that closes the gap of a point (None on other ranks).
 
-    It returns the signed distance, length, and its derivative by the control, and fills the gradient by x if
-    `with_gradient`.
+    It returns the signed distance, length, its derivative by the control, and fills the gradient by x if requested.
     """
     local = np.array([] if point is None else [point], dtype=int)
     law = face.law.part(local)

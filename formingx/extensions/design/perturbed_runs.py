@@ -56,8 +56,7 @@ _LARGEST_ROUND_OFF = 1e-10
 class PerturbedRunFailure(Failure):
     """Failure to find a state of a perturbed run near the state of the base run.
 
-    The change of the parameter is too large: it moves contact points by more than the distance over which the contact
-    pressure begins.
+    The change of the parameter moves contact points by more than the distance over which contact pressure begins.
     """
 
 
@@ -131,8 +130,7 @@ class PerturbedRun:
     def balance(self, base_residual: np.ndarray) -> None:
         """Set the `unbalanced` force of each contact by equilibrium with the internal forces of the body.
 
-        The gaps differ from those of the base run by less than round-off, so the contact law gives no accurate
-        force.
+        The contact law gives none: gaps differ from those of the base run by less than round-off.
         """
         forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
         F = self.residual(base_residual)[: self.problem.n_owned]

@@ -181,8 +181,7 @@ class DesignRun:
     def _perturbed_runs(self) -> list[tuple[list[PerturbedRun], float]]:
         """Return perturbed runs in their last state, and the denominator of the difference quotient, by parameter.
 
-        It is two steps of the parameter for the two runs without contact, one step for the single run with contact. A
-        run without derivative raises an InputError.
+        It is two steps of the parameter for two runs without contact, one step for the single run with contact.
         """
         contact, reason = bool(self.path.problem.contacts), ""
         for size in [_CONTACT_CHANGE / 10**k for k in range(3)] if contact else [DIFFERENCE_STEP]:

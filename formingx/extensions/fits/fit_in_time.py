@@ -188,8 +188,7 @@ class ShiftedTests:
 def _fit_branches(data: _TimedData, material: GeneralisedMaxwell, n: int) -> tuple[GeneralisedMaxwell, float]:
     """Return a material of n fitted branches, ascending in time, and the root mean square of relative misfits.
 
-    A given material of n branches is one of the guesses. Fewer points than constants, or no finite stress, are an
-    InputError.
+    A given material of n branches is one guess. Fewer points than constants, or no finite stress: InputError.
     """
     from scipy.optimize import least_squares
     if len(data.stress) < (needed := len(material.parameters) - 2 * len(material.branches) + 2 * n):

@@ -124,8 +124,7 @@ def read_tests(file: Path, test: str | None = None, specimen: Any = None) -> lis
 def _head(caller: str, rows: list[tuple[int, list[str]]]) -> tuple[int, dict[str, int] | None, dict[str, Any]]:
     """Return the line behind the one that names the columns, {quantity or name: column}, and {quantity: unit or None}.
 
-    A title is skipped; without names it is (0, None, {}). Two columns of one quantity, or an unknown unit, are an
-    InputError.
+    A title is skipped; without names it is (0, None, {}). A quantity twice, or an unknown unit, is an InputError.
     """
     for start, (_, row) in enumerate(rows, 1):
         cells = [name_and_unit(cell) for cell in row]

@@ -68,8 +68,7 @@ def uncertainty(stress: Callable, constants: dict[str, float], measured: np.ndar
 def _slope(stress: Callable, first: np.ndarray, values: np.ndarray, i: int, sizes: np.ndarray) -> np.ndarray:
     """Return the derivative of the stresses over their sizes, (n,), by constant i of (p,) values.
 
-    The step grows until a stress changes by more than 1e-6 of its size; if it exceeds the constant, the derivative is
-    0.
+    The step grows until a stress changes by over 1e-6 of its size; if it exceeds the constant, the result is 0.
     """
     step = math.copysign(max(1e-4 * abs(values[i]), 1e-30), values[i])
     largest = abs(values[i]) or math.inf        # a larger step of an exponent without effect would have one

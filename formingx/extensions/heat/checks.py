@@ -87,8 +87,7 @@ def coarse_layers(body: Any) -> Iterator[Finding]:
 def stiffening_on_cooling(body: Any) -> Iterator[Finding]:
     """Yield a warning for each constant that is more than twice as large at the lowest temperature as at the highest.
 
-    The stress of the stretched part then increases on cooling. Such a part springs back, while a part that solidifies
-    keeps its shape.
+    The stress of the stretched part then grows on cooling: it springs back, while a solidified part keeps its shape.
     """
     scene = body.scene
     if scene.heat is None:

@@ -340,8 +340,7 @@ class HeatRun:
     def _state_at(self, time: float | None) -> list[np.ndarray]:
         """Return the temperatures of body and tools at a time, as an entry of `states`; None: the end of the run.
 
-        Between accepted states Hermite's cubic is used, with slopes of parabolas through neighbours. A time outside the
-        run is an InputError.
+        Hermite's cubic with slopes of parabolas is used in between. A time outside the run is an InputError.
         """
         times = self._times
         t = times[-1] if time is None else finite("time", time)
@@ -361,8 +360,7 @@ class HeatRun:
     def _slope(self, k: int) -> list[np.ndarray]:
         """Return the time derivatives of the temperatures in state k, degrees per time, with the shapes of `states[k]`.
 
-        They are slopes of the parabola through it and its two neighbours (at an end the nearest three), or of the chord
-        of two states.
+        They are slopes of the parabola through the nearest three states, or of the chord of two.
         """
         i = min(max(k, 1), len(self._times) - 2)
         if i < 1:

@@ -56,8 +56,7 @@ class SpaceError:
     def _face_temperatures(self, touch: HeatContact, finer: HeatContact, excess: np.ndarray) -> np.ndarray:
         """Return excess temperatures of the tool below the k nodes of cubic elements, shape (k, m), degrees.
 
-        Column 0 is interpolated from `excess` of the quadratic elements; the others, without effect on the body, are
-        0.
+        Column 0 is interpolated from `excess` of the quadratic elements; the others have no effect on the body.
         """
         found = np.zeros((len(finer.dofs), excess.shape[1]))
         if touch.conducts:

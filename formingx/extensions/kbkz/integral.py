@@ -104,8 +104,7 @@ class MemoryIntegral:
                              smallest_h: np.ndarray | None = None) -> tuple[Any, ...]:
         """Return Cbar_k^-1 of K past states, shape (K, 4, n), damping h, and dh/dI1 and dh/dI2, shape (K, n) each.
 
-        Tensors have the entries 11, 22, 12, 33: C (4, n), `past` (K, 4, n). `smallest_h`, shape (K, n), bounds h; None:
-        no bound.
+        Entries are 11, 22, 12, 33: C (4, n), `past` (K, 4, n). `smallest_h`, (K, n), bounds h; None: no bound.
         """
         inverse = _inverse(past)
         if self.damping is None:

@@ -138,8 +138,7 @@ class PastStates:
                  mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
         """Return the past states of a run on another mesh, interpolated to this mesh; collective.
 
-        `mapping` takes reference points of the other mesh, shape (n, coordinates), to this mesh. x and control are not
-        used.
+        mapping: reference points of the other mesh, shape (n, coordinates), to this mesh; x, control: not used.
         """
         interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
         F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
@@ -162,8 +161,7 @@ class PastStates:
     def _indices_to_keep(self, states: list[PastState], C: np.ndarray, smallest_h: np.ndarray | None) -> list[int]:
         """Return the indices of the past states that cannot be interpolated from their neighbours; collective.
 
-        The last of the K states is the present one. Cbar has shape (4, n), the bound `smallest_h` of damping (K, n) or
-        None.
+        The last of the K states is the present one. Cbar: (4, n); the bound `smallest_h` of damping: (K, n) or None.
         """
         if len(states) < 5:
             return list(range(len(states)))

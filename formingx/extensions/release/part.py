@@ -12,8 +12,7 @@ _EDGES = ((0, 1), (1, 2), (2, 0))
 def trimmed_mesh(mesh: Mesh, line: np.ndarray, segments: int) -> Mesh:
     """Return the elements of a mesh along the first segments of a polyline (n, 2) through the body; collective.
 
-    A boundary that vanishes, such as the rim, moves to the cut edges, else named "trim". A layer without elements is an
-    InputError.
+    A boundary that vanishes, such as the rim, moves to the cut edges, else "trim". An empty layer is an InputError.
     """
     grid = gathered(mesh)
 

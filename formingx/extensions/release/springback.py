@@ -186,8 +186,7 @@ def _run(problem: Problem, x: np.ndarray, cooling_time: float, accuracy: float, 
 def _heat(scene: Scene, mesh: Mesh, temperature: Any, boundaries: Any, duration: Any, wall: Wall) -> tuple[Any, float]:
     """Return the `Cooling` of the released part (or None without heat), and the duration of its cooling or relaxation.
 
-    Faces get a temperature after the release or laws {boundary: temperature}; None is the default. Arguments that do
-    not fit the scene are an InputError.
+    Faces get a temperature or laws {boundary: temperature}. Arguments unfit for the scene are an InputError.
     """
     if scene.heat is None:
         if temperature is not None or boundaries is not None:

@@ -80,8 +80,7 @@ class ContactState(NamedTuple):
 def transfer_contact(face: FaceContact, old: ContactState, fields: np.ndarray, control: float) -> None:
     """Transfer the pressure and friction per present area of a face to the same face on the new mesh, in place.
 
-    The distance of each contact point is offset, so that the contact law gives this pressure at any depth in the
-    tool.
+    The distance of each contact point is offset, so that the law gives this pressure at any depth in the tool.
     """
     x, law, rule = face.positions(fields, control), face.law, face.rule
     assert isinstance(rule, Lobatto)

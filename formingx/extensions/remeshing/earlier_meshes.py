@@ -107,8 +107,7 @@ class _OutlineProjection:
     def _closest(self, x: np.ndarray, edge: np.ndarray, s: np.ndarray, fixed: bool = False) -> tuple[np.ndarray, ...]:
         """Return the closest points on given edges: parameter, shape (n, 1), offset and outer normal, shape (n, 2).
 
-        The points x have shape (n, 2), length. The guesses s go from 0 at the start of an edge to 1; `fixed` keeps
-        them.
+        x: shape (n, 2), length. The guesses s go from 0 at the start of an edge to 1; `fixed` keeps them.
         """
         a, b, middle = np.moveaxis(self._edges[edge], 1, 0)
         s, bend = s[:, None], 2 * (a + b - 2 * middle)

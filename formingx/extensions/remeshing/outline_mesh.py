@@ -105,8 +105,7 @@ def enclosed_volume(edges: np.ndarray, axisymmetric: bool) -> float:
 def without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.ndarray:
     """Return the edges of the outline, shape (m, 3, 2), with shallow pockets between body and tool closed.
 
-    Nodes between two contact nodes, `touched` (k, 2), move onto the line of these if all are within `depth` of it,
-    length.
+    Nodes between two contact nodes, `touched` (k, 2), move onto their line if all are within `depth`, length.
     """
     nodes, n = edges[:, [0, 2]].reshape(-1, 2).copy(), 2 * len(edges)
     close = 1e-6 * np.ptp(nodes, axis=0).max()
@@ -143,8 +142,7 @@ def refined_points(edges: np.ndarray, names: list[frozenset[str]],
 def _nodes_along(edges: np.ndarray, corners: np.ndarray, size: float, corner: float) -> tuple[np.ndarray, np.ndarray]:
     """Return nodes of new elements along a line of edges: ends, shape (n + 1, 2), and midpoints, shape (n, 2).
 
-    Edges have shape (m, 3, 2); elements have `size`, and the size `corner` at the positions `corners`, shape (k, 2),
-    length.
+    Edges have shape (m, 3, 2); elements have `size`, and `corner` at the positions `corners`, (k, 2), length.
     """
     parameter = np.linspace(0, len(edges), FINE_PIECES * len(edges) + 1)
 

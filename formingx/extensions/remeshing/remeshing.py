@@ -256,8 +256,7 @@ def _volume_ratios(record: Record, state: State) -> tuple[float, float]:
 def _check_mesh(record: Record, state: State, remesh: Remesh) -> None:
     """End the run on the present mesh if J, the volume ratio since it was made, leaves `Remesh.volume_ratio`.
 
-    In the first state on a new mesh (kind "remesh") the relative changes of force and strain energy are stored in
-    `State.jump`.
+    `State.jump` of a "remesh" state gets the relative changes of force and strain energy.
     """
     if state.kind == "remesh":
         before = record.segments[-2].states[-1].measures
@@ -328,8 +327,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
 def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
     """Return the unknowns in equilibrium at a control, from the transferred unknowns x, shape (n,), on a new mesh.
 
-    Newton's method is tried first; then the unbalanced forces are reduced to zero as loads along `curve`. Failing both
-    is a ConvergenceError.
+    Newton's method is tried, then unbalanced forces fade along `curve`. Failing both is a ConvergenceError.
     """
     first = problem.setting
     problem.x.array_w[:] = x

@@ -167,8 +167,7 @@ class StateTransfer(NamedTuple):
     def _find_cells(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return the old cells, shape (n,), in which points (n, 2) of the deformed body lie, and local coordinates.
 
-        Newton's method is used in the nearest cells. A point outside the body is placed on the edge of the nearest
-        element.
+        Newton's method is used in the nearest cells. A point outside is placed on the edge of the nearest one.
         """
         from scipy.spatial import cKDTree
         inside = 0.9 * _LATTICE + 0.1 / 3

@@ -185,8 +185,7 @@ def slack_sheet(failure: Any) -> Iterator[Finding]:
 def slack_part(failure: Any) -> Iterator[Finding]:
     """Yield a finding if the largest out-of-balance force is at a slack part of a sheet; collective.
 
-    With relaxed energy such a part carries no tension in one direction, and little in the other. Its tangent is nearly
-    singular.
+    With relaxed energy it has little tension in one direction, none in the other: its tangent is nearly singular.
     """
     problem, worst = failure.problem, failure.facts.get("worst")
     scene = problem.scene

@@ -236,8 +236,7 @@ def _turn_ahead(borders: Borders, rows: np.ndarray) -> np.ndarray:
 def _bends_behind(borders: Borders, ends: Borders, rows: np.ndarray) -> np.ndarray:
     """Return the mask of sharp edges from which their region leads to a curved surface at its far side, shape (k,).
 
-    A region between two sharp edges, such as a facet of a cone, has no curvature from one to the other. `borders` are
-    smooth.
+    Between two sharp edges, as a facet of a cone, it has no curvature from one to the other. `borders` are smooth.
     """
     found = np.zeros(len(rows), dtype=bool)
     for near, far in _pairs(ends.region[rows], borders.region):

@@ -102,8 +102,7 @@ class Intersection(SolidTool):
 def _inside(corners: np.ndarray, tool: SolidTool, size: float) -> np.ndarray:
     """Return the triangles of a surface that lie in the solid of a tool, cut at its surface, shape (k, 3, 3), length.
 
-    corners: shape (m, 3, 3), length; size: extent of the surface, length. Triangles that the surface of the tool may
-    cross are halved until they are short.
+    corners: shape (m, 3, 3), length; size: extent. Triangles that may be cut are halved until they are short.
     """
     found, near = [], 1e-9 * size
     while len(corners):

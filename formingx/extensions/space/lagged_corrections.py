@@ -30,8 +30,7 @@ class LaggedCorrections:
     def separate(self, curve: Curve, old: State, new: State, jump: Callable[[State], State]) -> State:
         """Separate the points in tension from their tools, and solve for `new` again at the same control.
 
-        `jump` returns the state after a snap-through if the body snaps off its tool. Raise `Failure` without a
-        state.
+        `jump` returns the state after a snap-through if the body snaps off. Raise `Failure` without a state.
         """
         for _ in range(LAGGED.max_solutions):
             if not self._separates(new):

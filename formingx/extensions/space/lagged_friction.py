@@ -101,8 +101,7 @@ class LaggedFriction(LaggedStick):
     def friction_pressure(self, old: ContactHistory) -> np.ndarray:
         """Return the contact pressure N_0 that limits friction during the next step, shape (n,), stress.
 
-        It is the penalty times the depth of `ContactHistory.closure`, at most 10 times larger or smaller than the
-        pressure at the last accepted state.
+        It is k times the depth of `ContactHistory.closure`, within a factor of 10 of the last accepted pressure.
         """
         if self._pressure_ahead is None or self._pressure_ahead[0] is not old:
             now, change = np.maximum(old.distance, 0.0), old.closure - old.position

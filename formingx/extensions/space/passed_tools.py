@@ -102,8 +102,7 @@ class PassedTool:
     def _travels(self, x: np.ndarray, corners: np.ndarray, most: np.ndarray) -> np.ndarray:
         """Return how far triangles move along their normals until all corners are on the tool, shape (n,), length.
 
-        It is infinite above `most`, shape (n,). x: points of the tool, shape (n, 3); corners: shape (n, 3, 3),
-        length.
+        It is infinite above `most`, (n,). x: points of the tool, (n, 3); corners: shape (n, 3, 3), length.
         """
         normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         normal /= np.linalg.norm(normal, axis=1)[:, None]

@@ -44,8 +44,7 @@ class SheetReader:
     def fields(self, state: State, places: np.ndarray) -> dict[str, np.ndarray]:
         """Return fields at k places of the m owned triangles in a state, shape (m, k, components), by name; collective.
 
-        They are the principal stresses, the means over the thickness, and the temperatures of a sheet that conducts
-        heat.
+        They are principal stresses, means over the thickness, and temperatures of a sheet that conducts heat.
         """
         problem, found = self._path.problem, {}
         cells = own_cells(problem.forms.domain)

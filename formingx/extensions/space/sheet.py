@@ -176,8 +176,7 @@ def outline_edges(outline: Any, caller: str) -> list[Edge]:
 def chords(edges: list[Edge], caller: str) -> np.ndarray:
     """Return the corners of an outline with each arc divided into 8 chords, shape (n, 2), length.
 
-    Raise `InputError` for two equal corners in succession, or for an outline that crosses or touches itself, for which
-    gmsh might not end.
+    Equal corners in succession, or a crossing outline, for which gmsh might not end, are an InputError.
     """
     points = []
     for edge in edges:

@@ -184,8 +184,7 @@ class Swept(SolidTool):
     def _profile_coordinate(self, x: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return the coordinate r of points, shape (n, 3), in the plane (r, z) of the profile, shape (n,), length.
 
-        Also its gradient, shape (n, 3), and the curvature of the curve of constant r through each point, shape (n,),
-        1/length.
+        Also its gradient, shape (n, 3), and the curvature of the curve of constant r there, (n,), 1/length.
         """
         way = np.zeros((len(x), 3))
         if self.kind == "extruded":

@@ -243,8 +243,7 @@ class Surface(Formulation):
     def _directions(self) -> tuple[Any, Any]:
         """Unit vectors in the surface to which laws refer (UFL, shape (3,) each).
 
-        They are x and y on a flat sheet and on a horizontal triangle, else the steepest line upwards and the
-        horizontal.
+        They are x and y on a flat sheet or horizontal triangle, else the steepest line up and the horizontal.
         """
         x, y, z = (ufl.as_vector([float(i == k) for k in range(3)]) for i in range(3))
         if self.mesh.flat:

@@ -201,8 +201,7 @@ def below(points: np.ndarray, triangles: np.ndarray, level: float) -> tuple[np.n
 def positive_part(corners: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return the part of triangles in which a linear function is not negative.
 
-    corners: shape (m, 3, 3), length; values at them, shape (m, 3). Vertices, shape (k, 3), length; triangles, shape (j,
-    3); for each of these the number of its triangle of the surface, shape (j,).
+    corners: (m, 3, 3), length; values: (m, 3). Results: vertices (k, 3), triangles (j, 3), their old triangles (j,).
     """
     inside = values >= 0
     whole, cut = np.flatnonzero(inside.all(1)), np.flatnonzero(inside.any(1) & ~inside.all(1))

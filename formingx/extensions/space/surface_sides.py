@@ -76,8 +76,7 @@ class SurfaceSides:
     def outside(self, x: np.ndarray, P: np.ndarray, height: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
         """Return the masks of points that are outside, and of points whose ray crosses the surface, shape (n,) each.
 
-        x: shape (n, 3), length. P: positions of the nodes, shape (k, 3), length. height: z of the point that has z = 0
-        here, length; the plane of a flat sheet is at 0.
+        x: shape (n, 3); P: nodes, shape (k, 3), length. height: z of the point that has z = 0 here, length.
         """
         y, Q = (np.ascontiguousarray(points @ self.axes.T) for points in (x, P))
         low, high = Q[:, :2].min(0), Q[:, :2].max(0)

@@ -99,8 +99,7 @@ def _smallest_edge(tool: Any, convex: bool) -> float:
 def _smallest_fillet(tool: Any, nodes: np.ndarray | None, length: float) -> tuple[float, np.ndarray | None]:
     """Return the radius of the smallest concave fillet of a tool, length, and a place there, shape (3,), or None.
 
-    nodes: of a flat sheet, shape (n, 3), else None: files are not examined. length: median edge of its triangles.
-    Without a small fillet the radius is inf.
+    nodes: of a flat sheet, (n, 3), else None: files are not examined. length: median edge. Without fillet: inf.
     """
     if isinstance(tool, Swept):
         arcs = (piece for piece in tool.profile.pieces if isinstance(piece, Arc) and piece.radius > 0)

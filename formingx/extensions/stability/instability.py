@@ -364,8 +364,7 @@ def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
 def wave_numbers(scene: Any, modes: Any) -> list[float]:
     """Return the wave numbers that a user gave as a list without duplicates (in plane strain per length).
 
-    None, a negative or fractional number of waves, and waves shorter than the edges of the elements are an
-    InputError.
+    None, a negative or fractional number, and waves shorter than the elements are an InputError.
     """
     try:
         numbers = [finite("stability: modes", n) for n in modes]

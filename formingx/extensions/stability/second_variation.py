@@ -45,8 +45,7 @@ _FREE_MOTION_FORCE = 1e-6
 class _BodyWithMode(LoadedBody):
     """Loaded body with a circumferential mode, as `Load.mode_work` expects it.
 
-    The mode has displacement amplitudes (u_r, u_z, u_hoop) (UFL, shape (3,), length), `dmode` is their variation, and H
-    the change of F (UFL, shape (3, 3)).
+    mode: amplitudes (u_r, u_z, u_hoop) (UFL, length), `dmode` their variation, H the change of F, (3, 3).
     """
 
     def __init__(self, forms: Any, mode: Any, dmode: Any, H: Any):
@@ -96,8 +95,7 @@ class SecondVariation:
     def fill(self, number: float, antisymmetric_about: str | None = None) -> Any:
         """Assemble and return `matrix` at the present state for the modes of a wave number and symmetry.
 
-        In plane strain the number is a wave number along the depth, 1/length. Modes may be antisymmetric about a
-        symmetry plane, given by name.
+        In plane strain the number is per length along the depth. antisymmetric_about: name of a symmetry plane.
         """
         problem, m = self.problem, float(self._axisymmetric and number == 1)
         self._number.value, self._m.value = number, m
@@ -279,8 +277,7 @@ class SecondVariation:
     def _find_constrained(self, number: float, antisymmetric_about: str | None) -> np.ndarray:
         """Return the local numbers of the constrained unknowns of modes, with ghosts.
 
-        A boundary or node that is constrained in r and in z, such as a clamped rim or a fixed node, is also constrained
-        round the axis.
+        A boundary or node constrained in r and z, such as a clamped rim, is also constrained round the axis.
         """
         problem, constrained, supports = self.problem, [*self._idle], {0: [], 1: []}     # type: ignore[var-annotated]
         for i, scene_item in enumerate(problem.scene.items):
@@ -362,8 +359,7 @@ class SecondVariation:
     def _unknowns_of(self, mode: Any) -> np.ndarray:
         """Return a rigid motion as a mode, locally owned entries, shape (n,).
 
-        mode: function from deformed positions, shape (k, 2), length, to radial, axial and hoop amplitudes, shape (k,
-        3).
+        mode: function from deformed positions (k, 2), length, to radial, axial and hoop amplitudes, (k, 3).
         """
         forms, fields = self._forms, self.problem.x.array_r
         u = forms.length * fields[self._old]

@@ -42,8 +42,7 @@ def _outline(point: Any) -> list[tuple[np.ndarray, np.ndarray]]:
 def _draw(point: Any, lines: list, file: Any, scale: float | None) -> None:
     """Draw the surface that the outlines sweep round the axis, or along the depth in plane strain, to a PNG file.
 
-    Lines are (positions (m, 2), amplitudes (m, 3)); `scale` is the largest mode displacement over the body size, None
-    for at most 0.15.
+    Lines: (positions (m, 2), amplitudes (m, 3)); scale: largest displacement over size, None: at most 0.15.
     """
     pyvista = figures.pyvista()
     axisymmetric = point.path.problem.scene.kinematics.axisymmetric

@@ -205,8 +205,7 @@ class AdmissibilityCheck:
     def _excess_penetration(self, edges: np.ndarray, lengths: np.ndarray, state: State) -> Iterator[Depth]:
         """Yield for each tool the edge with the largest penetration over wall, if it exceeds the limit.
 
-        Edges have shape (m, 3, 2), lengths (m,). The penetration is the largest one of three nodes; contact points must
-        be nodes.
+        Edges: (m, 3, 2), lengths: (m,). The largest of three nodes counts; contact points must be nodes.
         """
         weight, reference = self._problem.scene.kinematics.weight, self._outline.reference_edges
         for contact, face in zip(self._problem.contacts, self._faces):

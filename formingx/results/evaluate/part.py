@@ -119,8 +119,7 @@ def part(wall: Wall, axisymmetric: bool, density: float | None = None, trim: flo
 def strips_within(wall: Wall, trim: float | tuple[str, float] | None) -> np.ndarray:
     """Return the fraction, 0 to 1, of each strip of the wall that belongs to the trimmed part, shape (n - 1,).
 
-    The cut lies where the middle line passes the trim, radius r or ("height", h), for the last time. A trim out of
-    reach is an InputError.
+    The middle line is cut where it passes the trim, r or ("height", h), for the last time, else an InputError.
     """
     inside = np.ones(len(wall.r) - 1)
     if trim is None:
@@ -151,8 +150,7 @@ def _strips(bottom: np.ndarray, top: np.ndarray, axisymmetric: bool, start: np.n
             end: np.ndarray | None = None) -> np.ndarray:
     """Return the volumes of the m - 1 strips between two lines, length^3; in plane strain per unit depth, length^2.
 
-    Lines have points (m, 2), length. The first and last strip extend to lines `start` and `end`, shape (k, 2); None is
-    straight.
+    Lines: (m, 2), length. First and last strip extend to lines `start` and `end`, (k, 2); None is straight.
     """
     corners = [bottom[:-1], bottom[1:], top[1:], top[:-1]]
     total = np.zeros(len(bottom) - 1)

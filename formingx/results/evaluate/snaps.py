@@ -37,8 +37,7 @@ class Snap(NamedTuple):
 def largest(path: Any) -> Snap | None:
     """Return the snap-through of a path in which the wall changed most, or None; collective.
 
-    Only problems with history variables are examined: there the state after a snap-through depends on the motion to
-    it.
+    Only problems with history variables count: there the state after it depends on the motion.
     """
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
     if not jumps or not path.problem.history.path_dependent:

@@ -138,8 +138,7 @@ class Fitted(NamedTuple):
     def error(self, exact: Callable | None = None) -> StressError:
         """Return the errors of the computed stress in this rank's cells: its differences from a more accurate stress.
 
-        The `exact` stress is a function of positions (n, 2) with shape (n, 3, 3); default the fitted one. Another type
-        or shape is an InputError.
+        `exact`: function of positions (n, 2) to (n, 3, 3), default the fitted one; others: InputError.
         """
         better = self.smooth
         if exact is not None:

@@ -87,8 +87,7 @@ class EnergyBalance:
                 times: int = _MAX_HALVINGS) -> dict[str, float]:
         """Return {entry: energy added} of a step from a to b, with further states between; collective.
 
-        Halving ends below the change `small` of energy, or after `times`; without a state in between `estimate`
-        remains.
+        Halving ends below the change `small` of energy, or after `times`; without a state `estimate` remains.
         """
         middle = self._middle(a, b) if times and a.setting == b.setting and b.kind != "jump" else None
         if middle is None:
@@ -246,8 +245,7 @@ class EnergyBalance:
     def _friction(self, a: Any, b: Any) -> float:
         """Return the energy that friction on the modelled body dissipates from state a to state b, stress length^3.
 
-        It is the sum over all contact points of area times mean tangential traction times increment of inelastic
-        slip.
+        It is the sum over points of area times mean tangential traction times increment of inelastic slip.
         """
         problem, lost, before = self._problem, 0.0, {}
         contacts = [c for c in problem.contacts if c.law.has_friction and not c.contact.sticks]

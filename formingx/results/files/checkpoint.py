@@ -85,8 +85,7 @@ class Checkpoint:
     def _begin(self) -> int:
         """Create the folder, or check that its states belong to this run, and return their number; collective.
 
-        States of an unfinished last step are removed. Another run or other files are an InputError, failed writing an
-        OSError.
+        States of an unfinished last step are removed. Another run or other files are an InputError.
         """
         problem, folder, path = self._path.record.segments[0].problem, self.folder, self._path
         scene = describe(problem)

@@ -143,8 +143,7 @@ def complete_states(folder: FilePath) -> list[FilePath]:
 def read_data(folder: FilePath, number: int, checksums: bool = True) -> dict:
     """Return the data of a state of a checkpoint as {name: value}, with its arrays.
 
-    They are the attributes of the `State`, history variables as "memory", "profile", "number" and "checksums". A
-    missing or changed file is an InputError.
+    They are attributes of the `State`, "memory" (history), "profile", "number", "checksums"; damage: InputError.
     """
     state_folder = folder / state_name(number)
     data = read_json(state_folder / "state.json")

@@ -37,8 +37,7 @@ def write_stages(folder: FilePath, plans: Sequence[Any], comm: Any) -> None:
 def check_stages(folder: FilePath, plans: Sequence[Any], number: int, now: float, comm: Any) -> None:
     """Check that a process has the stages by which the states of a checkpoint were made; collective.
 
-    Stage `number`, at process time `now`, may continue to another end. Unknown stages, or the first difference, are an
-    InputError.
+    Stage `number`, at process time `now`, may go on to another end. The first difference is an InputError.
     """
     def check():
         if not (folder / STAGES).exists():

@@ -88,8 +88,7 @@ def incomparable(about: Any, where: str = "") -> Iterator[tuple[str, str]]:
 def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
     """Yield the differences between two values of JSON data as (place, value in a, value in b).
 
-    A value in one only is None in the other; floats that agree to nine digits are equal. `where` is the place of
-    both.
+    A value in one only is None in the other; floats equal to nine digits are equal. `where`: place of both.
     """
     if isinstance(a, dict) and isinstance(b, dict):
         for key in dict.fromkeys([*a, *b]):

@@ -126,8 +126,7 @@ class Fields:
 def to_vtk(path: Any, file: Any, states: Any = None) -> None:
     """Write fields of states as VTU files, NAME-3.vtu for state 3, and a PVD file (`Path.to_vtk`).
 
-    States are a state, a sequence, or "all"; default the last. Another ending or type is an InputError, a failed file
-    an OSError.
+    `states`: one, a sequence, "all", None: the last. Wrong types are an InputError, a failed file an OSError.
     """
     file, comm = files.named("to_vtk", file, ".pvd"), path.problem.comm
     meshes: dict[int, tuple[Fields, Any]] = {}              # fields, and points of all ranks
@@ -177,8 +176,7 @@ def _three(array: np.ndarray) -> np.ndarray:
 def _chosen(path: Any, states: Any) -> list[tuple[int, Any]]:
     """Return (number, state) of the states to be written: one, a sequence, "all", or None for the last.
 
-    The number is that in the path, for one from `Path.state_at` its position; if they do not increase, they count from
-    0. A wrong entry is an InputError.
+    The number is that in the path, of `Path.state_at` its position; unless they increase, they count from 0.
     """
     if isinstance(states, str):
         if states != "all":

@@ -42,8 +42,7 @@ def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
     """Write an axisymmetric sheet as shell elements for CalculiX or Abaqus (`Path.to_inp`; rank 0 writes).
 
-    The file holds nodes, elements, wall thickness, and the set of nodes at the rim. Another ending than .inp is an
-    InputError, a failed file an OSError.
+    It has nodes, elements, wall, and the set of nodes at the rim. Another ending is an InputError.
     """
     file = tabular.named("to_inp", file, ".inp")
     points, walls, tips, quads = shells(profile, parts)

@@ -78,8 +78,7 @@ def to_stl(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: 
 def to_gltf(surface: tuple[np.ndarray, np.ndarray, np.ndarray], file: Any, comm: Any, units: Units = NONE) -> None:
     """Write the surface of a part as a binary glTF file, coloured by the wall ratio (rank 0 writes).
 
-    It is (points (n, 3), triangles (m, 3), ratios (n,)) in `units`; the file is in metres. Another ending than .glb is
-    an InputError, a failed file an OSError.
+    It is (points (n, 3), triangles (m, 3), ratios (n,)) in `units`; the file is in metres, its ending .glb.
     """
     from matplotlib import colormaps
     file = tabular.named("to_gltf", file, ".glb")

@@ -124,8 +124,7 @@ def _label(record: ReportData, units: Units, key: str) -> str:
 def _tools(record: ReportData) -> list[dict[str, Any]]:
     """Return the data of each tool of a section for `report.js`.
 
-    "line" and, moved inwards, "shell" have shape (2, n); "moves" is the displacement (r, z) per travel, "travel" that
-    of each state, None while inactive.
+    "line" and, moved inwards, "shell": (2, n); "moves": displacement per travel; "travel": of each state, or None.
     """
     shapes = [p for p in record.profiles if p is not None]
     size = max((np.ptp(np.vstack([p.bottom, p.top]), axis=0).max() for p in shapes), default=1.0)

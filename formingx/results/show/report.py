@@ -102,8 +102,7 @@ def _page(records: list[ReportData], names: list[str], parts: list, title: str, 
           findings: list[Finding]) -> str:
     """Return the report as an HTML page.
 
-    `parts` has for each run its `Part` or None; `failure` is the error that ended the run, or None. `findings` are on
-    parts of the report that failed.
+    `parts`: `Part` or None of each run; `failure`: the error that ended it, or None; `findings`: on failed parts.
     """
     alone, attempts = len(records) == 1, Attempts()
     body = [f"<h1>{html.escape(title)}</h1>", f"<p class=lead>{introduction(records[0], units)}</p>"]

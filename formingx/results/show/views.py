@@ -75,8 +75,7 @@ def _bounds(profile: Any) -> tuple[np.ndarray, np.ndarray]:
 def _draw(profile: Any, stations: np.ndarray, place: Callable, camera: np.ndarray, file: Any) -> None:
     """Draw the surface that a section sweeps out as a PNG on this rank.
 
-    `place` maps points (n, 2) and one of the `stations` (m,) to x, y, z, (n,) each. The camera is a direction from the
-    sheet.
+    `place` maps points (n, 2) and a station to x, y, z; the camera is a direction from the sheet.
     """
     pyvista = figures.pyvista()
 

@@ -17,8 +17,7 @@ from .columns import ColumnConduction
 class ColumnHistory(CoolingHistory):
     """History variables of the temperature of a sheet in three dimensions.
 
-    `HeatState.temperature` has the temperatures of the columns, shape (n, m), at m points through the thickness of the
-    n locally owned nodes.
+    `HeatState.temperature` has those at m points through the thickness of n locally owned nodes, shape (n, m).
     """
 
     def _conduction(self, degree: int = 2) -> ColumnConduction:
