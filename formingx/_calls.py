@@ -43,10 +43,7 @@ class _WrongCall(InputError, TypeError):
 
 
 def explain(module: types.ModuleType) -> None:
-    """Make the public functions and classes of a module, and their methods, explain calls with wrong arguments.
-
-    It raises an `InputError` that names the wrong argument and its type. The functions of `module` are replaced.
-    """
+    """Make public functions, classes and methods of a module explain calls with wrong arguments by an `InputError`."""
     for name, item in list(vars(module).items()):
         if name.startswith("_") or not getattr(item, "__module__", "").startswith(_PACKAGE):
             continue

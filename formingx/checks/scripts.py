@@ -26,10 +26,7 @@ class _DryRun(BaseException):
 
 
 def check_script(script: Any, arguments: Sequence[str] = ()) -> Report:
-    """Return the findings on the first scene that a Python script runs; nothing is solved.
-
-    The code before its first run is executed. A missing file or run, or a refused scene, is an InputError.
-    """
+    """Return findings on a script's first scene, run up to there; no file, run or sound scene is an InputError."""
     file = file_path("check: script", script)
     if not file.is_file():
         raise InputError(f"check: script {str(file)!r} is not there")

@@ -145,10 +145,7 @@ class PressurisedFace:
 
     @cached_property
     def mould_points(self) -> tuple[np.ndarray, np.ndarray]:
-        """Points of the opposite face, and the points at which they would meet the tools, shape (n, 2) each, length.
-
-        They move along the normal, away from the face under pressure, to infinity if they meet no tool.
-        """
+        """Points of the opposite face, and where their normals meet the tools or inf, shape (n, 2) each, length."""
         points = np.unique(np.vstack([self._body.scene.mesh.nodes_of(c.on) for c in self.tools]), axis=0)
         points, directions = outward_directions(points, self.line)
         limit = 100 * self._body.length
@@ -225,10 +222,7 @@ def _limit_pressures(body: SizedBody) -> Found:
 
 @register("scene")
 def _blow_ratio(body: SizedBody) -> Found:
-    """Report a tube that is blown into a mould that is too wide for it.
-
-    Its radius grows over 8-fold, or a uniform tube falls below 0.8 times its largest pressure: it bulges locally.
-    """
+    """Report a tube blown over 8-fold, or past where a uniform tube's pressure is 0.8 times its peak: it bulges."""
     for face in body.pressurised_faces:
         if not (face.tools and face.tall and face.axisymmetric):
             continue

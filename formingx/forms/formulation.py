@@ -364,10 +364,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def mid(self, layer: str, R: np.ndarray, Z: np.ndarray) -> np.ndarray:
-        """Return the heights at which functions of the position are evaluated in a layer, shape (n,), length.
-
-        For a solid they are Z, for a membrane, the mid-surface of all layers, halfway between the layer's faces.
-        """
+        """Return heights (n,), length, at which functions are evaluated: Z, in membranes halfway through the layer."""
 
     @abstractmethod
     def _make_mesh(self) -> Any:

@@ -48,10 +48,7 @@ class PoleStressRatio:
                                                        for t in forms.terms)
 
     def evaluate(self) -> float:
-        """Return the present Mises stress at the pole over the relaxed one; collective.
-
-        A relaxed stress of 0 gets a small equibiaxial strain: an undeformed body has the ratio of moduli.
-        """
+        """Return present over relaxed Mises stress at the pole, the ratio of moduli if undeformed; collective."""
         stored, relaxed, modulus = self._integrals()
         if relaxed < ROUND_OFF * modulus:
             self._strain.value = _ADDED_STRAIN

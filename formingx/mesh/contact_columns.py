@@ -158,10 +158,7 @@ def _sharp_fillet(item: Any, fillet: FilletInSheet, thickness: float, accuracy: 
 
 
 def is_thick_sheet(mesh: Mesh) -> bool:
-    """Return True for a sheet from `disc` or `parison` whose thickness is 1/10 to 1/4 of its length.
-
-    Tools do not choose its elements (`for_contacts`). A thicker body is a block, whose wall is of no interest.
-    """
+    """Return True for a `disc` or `parison` of 1/10 to 1/4 of its length, whose elements tools do not choose."""
     if mesh.preset is None or mesh.columns is None:
         return False
     ends = mesh.columns.ends

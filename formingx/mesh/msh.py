@@ -153,10 +153,7 @@ def write(grid: Grid, file: str | os.PathLike) -> None:
 
 
 def _parts(found: Content, dim: int, kinds: dict[int, int], numbers: np.ndarray, file: str) -> dict[str, np.ndarray]:
-    """Return {name of a physical group: its elements, (m, nodes)} for one dimension.
-
-    Elements are indices into sorted `numbers`, (n,). A type not in `kinds`, or a missing node, is an InputError.
-    """
+    """Return {group: elements of its dimension, (m, nodes), indices into `numbers`}; others are an InputError."""
     parts: dict[str, list[np.ndarray]] = {}
     what = "triangles" if dim == 2 else "edges"
     tags = {group for b in found.blocks if b.dim == dim for group in b.groups}

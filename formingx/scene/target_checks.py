@@ -168,10 +168,7 @@ def _mould_volume(scene: Scene, contact: Any) -> tuple[float, float]:
 
 
 def _mould_volume_of_tube(scene: Scene, contact: Any, line: np.ndarray) -> float:
-    """Return the volume between a tube, closed below, and its mould, up to the upper end of the tube, length^3.
-
-    It is infinite if the mould is open. The volume within the outer face `line`, (n, 2), does not count.
-    """
+    """Return the volume between a closed tube's outer face (n, 2) and its mould, length^3; inf if that is open."""
     from scipy.ndimage import label
     line = line if line[0, 1] < line[-1, 1] else line[::-1]
     (r, top), (low, width) = line[-1], (contact.tool.bounds[0, 1], contact.tool.bounds[1, 0])

@@ -48,10 +48,7 @@ def _check_counts(expected: Counter, found: Counter) -> None:
 
 
 def _pieces(entity: Any, tolerance: float | None, name: str) -> list[Line | Arc]:
-    """Return the lines and arcs of a curve of ezdxf.
-
-    A damaged or unsupported curve, or a spline or ellipse without `tolerance`, is an InputError by name.
-    """
+    """Return lines and arcs of an ezdxf curve; damage, or a spline without `tolerance`, is an InputError."""
     try:
         return _read(entity, tolerance, name)
     except InputError:

@@ -105,10 +105,7 @@ def checked_columns(mesh: Mesh) -> Columns:
 
 
 def _new_ends(columns: Columns, factors: np.ndarray) -> np.ndarray:
-    """Return coordinates of the ends of k new columns along the sheet, such as radii of a disc, shape (k + 1,).
-
-    The n columns become longer by `factors`, (n,); inf is the longest. Too many new columns are an InputError.
-    """
+    """Return coordinates of ends of k new columns (k + 1,), longer by `factors` (n,); too many are an InputError."""
     old = columns.ends
     fractions = np.arange(_COLUMN_SAMPLES) / _COLUMN_SAMPLES
     samples = np.append((old[:-1, None] + np.diff(old)[:, None] * fractions).ravel(), old[-1])

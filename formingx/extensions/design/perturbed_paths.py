@@ -167,10 +167,7 @@ class _PerturbedPaths:
                     perturbed.keep_open(free | closing)
 
     def _close_gaps(self, number: int, face: Any, state: State, before: State) -> np.ndarray:
-        """Move points of the perturbed runs whose gap closes in a step to their positions of gap closure.
-
-        Return the mask of those that close at its end, shape (n,), for the n points of contact face `number`.
-        """
+        """Move perturbed points of face `number` to where gaps close; return the mask (n,) of those at the end."""
         history, law, n = face.history, face.law, self.problem.n_owned
         no_points = np.zeros(len(face.points), dtype=bool)
         if history is None or not law.has_friction or not face.active:

@@ -128,10 +128,7 @@ class PerturbedRun:
         return np.array(self.F.array_r)
 
     def balance(self, base_residual: np.ndarray) -> None:
-        """Set the `unbalanced` force of each contact by equilibrium with the internal forces of the body.
-
-        The contact law gives none: gaps differ from those of the base run by less than round-off.
-        """
+        """Set each contact's `unbalanced` force by equilibrium: gaps within round-off give no accurate force."""
         forms, fields = self.problem.forms, self.x[: self.problem.n_owned]
         F = self.residual(base_residual)[: self.problem.n_owned]
         unit = forms.stress * forms.volume / forms.length

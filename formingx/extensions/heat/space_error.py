@@ -54,10 +54,7 @@ class SpaceError:
         self._finer.destroy()
 
     def _face_temperatures(self, touch: HeatContact, finer: HeatContact, excess: np.ndarray) -> np.ndarray:
-        """Return excess temperatures of the tool below the k nodes of cubic elements, shape (k, m), degrees.
-
-        Column 0 is interpolated from `excess` of the quadratic elements; the others have no effect on the body.
-        """
+        """Return excess tool temperatures (k, m) below cubic nodes: column 0 interpolated, others without effect."""
         found = np.zeros((len(finer.dofs), excess.shape[1]))
         if touch.conducts:
             values = np.zeros(len(self._body.points))

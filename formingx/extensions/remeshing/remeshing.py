@@ -325,10 +325,7 @@ def _new_mesh(path: Any, remesh: Remesh, tolerances: Tolerances, share: float) -
 
 
 def _balanced(problem: Problem, curve: Curve, x: np.ndarray, control: float) -> np.ndarray:
-    """Return the unknowns in equilibrium at a control, from the transferred unknowns x, shape (n,), on a new mesh.
-
-    Newton's method is tried, then unbalanced forces fade along `curve`. Failing both is a ConvergenceError.
-    """
+    """Return unknowns x (n,) in equilibrium on a new mesh, by Newton or fading forces, else a ConvergenceError."""
     first = problem.setting
     problem.x.array_w[:] = x
     try:

@@ -174,10 +174,7 @@ def outline_edges(outline: Any, caller: str) -> list[Edge]:
 
 
 def chords(edges: list[Edge], caller: str) -> np.ndarray:
-    """Return the corners of an outline with each arc divided into 8 chords, shape (n, 2), length.
-
-    Equal corners in succession, or a crossing outline, for which gmsh might not end, are an InputError.
-    """
+    """Return corners of an outline, arcs in 8 chords, (n, 2), length; two equal or a crossing are an InputError."""
     points = []
     for edge in edges:
         a, b = np.array(edge.start), np.array(edge.end)

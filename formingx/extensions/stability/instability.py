@@ -362,10 +362,7 @@ def instability(modes: Iterable[float] = range(9)) -> InstabilityCondition:
 
 
 def wave_numbers(scene: Any, modes: Any) -> list[float]:
-    """Return the wave numbers that a user gave as a list without duplicates (in plane strain per length).
-
-    None, a negative or fractional number, and waves shorter than the elements are an InputError.
-    """
+    """Return the wave numbers of a user once each; none, negative, fractional or too short ones are an InputError."""
     try:
         numbers = [finite("stability: modes", n) for n in modes]
     except TypeError:

@@ -8,10 +8,7 @@ from ...errors import InputError, as_list, finite
 
 
 def sets_of_values(variables: Any) -> list[dict[str, float]]:
-    """Return the sets of values of a study, {name: value} for each run.
-
-    Values {name: values} are combined; a list of sets is checked. Others are an InputError.
-    """
+    """Return {name: value} of each run of a study: sets, or all combinations of values; others are an InputError."""
     if isinstance(variables, Mapping):
         levels = {str(name): [finite(f"study: {name}", v) for v in as_list(f"study: {name}", values, "numbers")]
                   for name, values in variables.items()}

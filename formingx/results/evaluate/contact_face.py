@@ -112,10 +112,7 @@ class ContactFace:
 
 
 def contact_of(path: Any, tool: Any, caller: str) -> list[Any]:
-    """Return the `FaceContact` objects of a tool, one for each face.
-
-    `tool`: its name or that of a face, a `Tool`, a `Contact`, or None for the only one, else an InputError.
-    """
+    """Return a tool's `FaceContact`s by a name, `Tool`, `Contact` or None for the only one, else an InputError."""
     contacts = path.problem.contacts
     found = [c for c in contacts if tool is None or tool in (c.contact.name, c.contact.on)
              or tool is c.contact.tool or tool is c.contact]

@@ -35,10 +35,7 @@ class Snap(NamedTuple):
 
 
 def largest(path: Any) -> Snap | None:
-    """Return the snap-through of a path in which the wall changed most, or None; collective.
-
-    Only problems with history variables count: there the state after it depends on the motion.
-    """
+    """Return the snap-through that changed the wall most, of problems with history variables, or None; collective."""
     jumps = [k for k, state in enumerate(path.states) if state.kind == "jump" and k]
     if not jumps or not path.problem.history.path_dependent:
         return None

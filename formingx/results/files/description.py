@@ -86,10 +86,7 @@ def incomparable(about: Any, where: str = "") -> Iterator[tuple[str, str]]:
 
 
 def differences(a: Any, b: Any, where: str = "") -> Iterator[tuple[str, Any, Any]]:
-    """Yield the differences between two values of JSON data as (place, value in a, value in b).
-
-    A value in one only is None in the other; floats equal to nine digits are equal. `where`: place of both.
-    """
+    """Yield (place, value in a, value in b), None in one only, of JSON data that differ in nine digits."""
     if isinstance(a, dict) and isinstance(b, dict):
         for key in dict.fromkeys([*a, *b]):
             yield from differences(a.get(key), b.get(key), f"{where}.{key}" if where else key)

@@ -78,10 +78,7 @@ def described(value: Any, depth: int = 8, known: tuple[int, ...] = ()) -> Any:
 
 
 def functions_in(value: Any, where: str = "", known: set[int] | None = None) -> Iterator[tuple[str, Any]]:
-    """Yield the functions and tables that an object of formingx holds, as (place, description).
-
-    Attributes, variables of functions, and entries are searched, but not the `known` objects.
-    """
+    """Yield (place, description) of functions and tables an object holds anywhere, but not the `known` ones."""
     known = set() if known is None else known
     if id(value) in known or value is None or isinstance(value, type | str | bool | int | float | np.ndarray):
         return
