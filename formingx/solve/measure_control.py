@@ -88,19 +88,13 @@ class QuantityRun(Run):
                 error = self._error_in_time(new, self._time_error) if self._time_error else 0.0
                 self.step.accepted(tangents(new.history), error)
                 return [self._met_before(old, self._limit_before(old, new))]
-            except Cutback as cut:
-                self.step.length = min(cut.part, _STEPS.max_cutback) * dt / self._duration
-                self._failed(str(cut), self.step.length)
+            except (Cutback, Failure) as failed:
+                part = min(failed.part, _STEPS.max_cutback) if isinstance(failed, Cutback) else 0.5
+                self.step.length = part * dt / self._duration
+                self._failed(str(failed), self.step.length)
                 if self.step.length < self.step.smallest:
                     self._give_up(f"the step in time became shorter than {self.step.smallest * self._duration:.3g}:"
-                                  f" {cut}")
-            except Failure as failure:
-                self.step.length = dt / self._duration
-                good = self.step.failed()
-                self._failed(failure.reason, self.step.length)
-                if not good:
-                    self._give_up(f"the step in time became shorter than {self.step.smallest * self._duration:.3g}:"
-                                  f" {failure.reason}", failure.attempt)
+                                  f" {failed}", getattr(failed, "attempt", None))
 
     def _next_event(self, time: float) -> float:
         """Return the first time after `time` to be met exactly: a corner or the end of the amplitude, or a target."""
