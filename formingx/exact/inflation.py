@@ -1,41 +1,12 @@
 r"""Exact solutions for comparison: the inflated circular membrane, the thick tube and the thick sphere.
 
-**Membrane** (Adkins and Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531). A flat circular membrane of Mooney material
-with a fixed rim, under a pressure p. The stretches are meridional, circumferential and through the thickness:
+**Membrane** (Adkins and Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531): the equations of `membrane_inflation` are
+integrated from the pole until the circumferential stretch is 1. Only the product p R enters, so this point is the rim
+for some radius, and scaling gives the result for the required one. If c10 varies with R, the secant method finds the
+pressure instead, such that the circumferential stretch is 1 at the rim.
 
-.. math:: \lambda_1, \qquad \lambda_2 = r/R, \qquad \lambda_3 = 1/(\lambda_1 \lambda_2)
-
-The tensions per deformed length, with reference thickness h0:
-
-.. math:: T_1 = 2 h_0 \lambda_3 (\lambda_1^2 - \lambda_3^2)(c_{10} + c_{01} \lambda_2^2), \qquad
-          T_2 = 2 h_0 \lambda_3 (\lambda_2^2 - \lambda_3^2)(c_{10} + c_{01} \lambda_1^2)
-
-Equilibrium, with the slope theta and the arc length s of the meridian:
-
-.. math:: \frac{d(T_1 r)}{dr} = T_2, \qquad T_1 \frac{d\theta}{ds} + T_2 \frac{\sin\theta}{r} = p
-
-The equations are integrated from the pole until the circumferential stretch is 1. Only the product p R enters, so this
-point is the rim for some radius, and scaling gives the result for the required one.
-
-If c10 varies with R, the tensions per reference length are used:
-
-.. math:: N_1 = 2 h_0 (\lambda_1 - \lambda_1^{-3} \lambda_2^{-2})(c_{10} + c_{01} \lambda_2^2), \qquad
-          R N_1 \sin\theta = \frac{p r^2}{2}, \qquad
-          \frac{d(R N_1 \cos\theta)}{dR} = N_2 - p r \lambda_1 \sin\theta
-
-There the pressure is found by the secant method, such that the circumferential stretch is 1 at the rim.
-
-**Thick wall** (Green and Adkins, Large Elastic Deformations, 1970; Mooney material), with n = 2 for a tube in plane
-strain and n = 3 for a sphere. A and a are the reference and the deformed inner radius:
-
-.. math:: r^n = R^n + a^n - A^n, \qquad \lambda = r/R
-
-Equilibrium is integrated from the free outer face, where the stretch is lambda_B:
-
-.. math:: \sigma_{rr} = g(\lambda_B) - g(\lambda)
-
-.. math:: g_\mathrm{tube} = 2 (c_{10} + c_{01}) (\ln\lambda - \tfrac{1}{2} \lambda^{-2}), \qquad
-          g_\mathrm{sphere} = -c_{10} (4 \lambda^{-1} + \lambda^{-4}) + c_{01} (4 \lambda - 2 \lambda^{-2})
+**Thick wall** (Green and Adkins, Large Elastic Deformations, 1970; Mooney material): equilibrium is integrated in
+closed form from the free outer face (`thick_wall`).
 """
 
 import math

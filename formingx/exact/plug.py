@@ -2,35 +2,16 @@ r"""Membranes under a plug, solved by ordinary differential equations, for compa
 
 A flat circular membrane with a fixed rim is pushed by a flat plug of radius r_p.
 
-**Sharp edge** (Mooney material). Outside the plug, N are tensions per reference length, H and V the radial and axial
-components of R N1:
+**Sharp edge** (Mooney material, `membrane_under_plug`). A sticking membrane keeps r = r_p at R = r_p. A membrane that
+slides without friction has the equal biaxial stretch l0 over the face. There N1 is continuous across the edge, at
+R = r_p/l0.
 
-.. math:: N_1 = 2 h_0 (\lambda_1 - \lambda_1^{-3} \lambda_2^{-2})(c_{10} + c_{01} \lambda_2^2), \qquad
-          N_2 = 2 h_0 (\lambda_2 - \lambda_2^{-3} \lambda_1^{-2})(c_{10} + c_{01} \lambda_1^2)
-
-.. math:: \frac{dH}{dR} = N_2, \qquad V = \frac{F}{2 \pi}, \qquad \frac{dr}{dR} = \frac{\lambda_1 H}{R N_1}, \qquad
-          \frac{dz}{dR} = \frac{\lambda_1 V}{R N_1}
-
-A sticking membrane keeps r = r_p at R = r_p. A membrane that slides without friction has the equal biaxial stretch l0
-over the face. There N1 is continuous across the edge, at R = r_p/l0.
-
-**Rounded edge with Coulomb friction** (neo-Hookean material). The flat of the plug carries no pressure. So the membrane
-has an equal biaxial stretch l0 there, and all of it that touches the edge and the side slides outwards. T are tensions
-per deformed length, s the arc length, phi the slope and kappa the curvature of the meridian (equilibrium: Adkins
-and Rivlin 1952; friction: Song 1993, eq. 5.9):
-
-.. math:: T_1 = 2 c_{10} h_0 \left(\frac{\lambda_1}{\lambda_2} - (\lambda_1 \lambda_2)^{-3}\right), \qquad
-          T_2 = 2 c_{10} h_0 \left(\frac{\lambda_2}{\lambda_1} - (\lambda_1 \lambda_2)^{-3}\right)
-
-.. math:: \frac{dT_1}{ds} = (T_2 - T_1) \frac{\cos\phi}{r} + \mu N, \qquad N = T_1 \kappa + T_2 \frac{\sin\phi}{r}
-
-On the side, kappa is 0. In the free part N = 0 gives kappa. On the edge, the thickness h of the sheet counts: its
-middle surface has the radius fillet + h/2, and friction acts h/2 below it. Moments about the centre of the edge give:
-
-.. math:: \kappa = \frac{1}{f + h/2}, \qquad \mu N \to \mu N \frac{f}{f + h/2}, \qquad
-          h = \frac{h_0}{\lambda_1 \lambda_2}
-
-with the fillet radius f. The travel is measured at the face of the plug.
+**Rounded edge with Coulomb friction** (neo-Hookean material, `membrane_sliding_over_plug`). The flat of the plug
+carries no pressure. So the membrane has an equal biaxial stretch l0 there, and all of it that touches the edge and the
+side slides outwards. On the side, the curvature kappa is 0. In the free part the contact pressure N = 0 gives kappa. On
+the edge, the thickness h of the sheet counts: its middle surface has the radius f + h/2, with the fillet radius f, and
+friction acts h/2 below it. Moments about the centre of the edge give the factor f/(f + h/2) of the friction. The travel
+is measured at the face of the plug.
 """
 
 import functools

@@ -6,24 +6,8 @@ and the relaxation time tau has the elastic logarithmic strains w:
 
 .. math:: \dot{w}_i = \dot{e}_i - \frac{1}{2 \tau} \left(e^{2 w_i} - \frac{1}{3} \sum_j e^{2 w_j}\right)
 
-The load is a sum over points of c(s) T. T is the difference of the stresses in directions 1 and 3:
-
-.. math:: T = 2 c_{10} (\lambda_1^2 - \lambda_3^2) + \sum \mu \left(e^{2 w_1} - e^{2 w_3}\right)
-
-**Block** under a nominal stress P, with s = ln(lambda):
-
-.. math:: P = T / \lambda
-
-**Thick wall** under a pressure p; n = 2 for a tube in plane strain, 3 for a sphere; 1 is hoop, 3 radial. The integral
-is evaluated by Gauss quadrature:
-
-.. math:: r^n = R^n + s, \qquad s = a^n - A^n, \qquad p = \int \frac{(n - 1) \, T \, R^{n-1}}{r^n} \, dR
-
-**Thin balloon** with reference radius R0 and thickness H0, with s = ln(lambda); 3 is through the wall:
-
-.. math:: \frac{p R_0}{H_0} = \frac{2 T}{\lambda^3}
-
-If s is prescribed, the branches are integrated in time. If the load is constant, its zero rate gives ds/dt.
+The load is a sum over points (`ThickBody`), by Gauss quadrature in a thick wall. If s is prescribed, the branches are
+integrated in time. If the load is constant, its zero rate gives ds/dt.
 """
 
 import math

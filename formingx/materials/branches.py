@@ -1,13 +1,8 @@
 r"""Relaxing branches in homogeneous tests: integration of their elastic strains in time.
 
-In principal direction i the body has the stretch l_i and the logarithmic strain :math:`e_i = \ln l_i`. A branch has the
-elastic part w_i of this strain, the modulus mu, and the Kirchhoff stress :math:`\mu \exp(2 w_i)` besides a pressure.
-The elastic strain relaxes with the relaxation time tau:
-
-.. math:: \frac{dw_i}{dt} = \frac{de_i}{dt} - \frac{f_i(w)}{2 \tau}
-
-The function f is the flow law of the material, such as :math:`f_i = e^{2 w_i} - \tfrac{1}{3} \sum_j e^{2 w_j}`
-(`formingx.materials.viscoelastic`).
+In principal direction i the body has the stretch l_i. A branch has the elastic part w_i of the logarithmic strain, the
+modulus mu, and the Kirchhoff stress :math:`\mu \exp(2 w_i)` besides a pressure. The elastic strain relaxes by the flow
+law of the material (`formingx.materials.viscoelastic`).
 """
 
 import itertools

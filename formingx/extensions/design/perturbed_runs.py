@@ -1,16 +1,10 @@
 r"""Perturbed runs: copies of a run with one parameter slightly changed, solved with the LU factors of the run.
 
 Each perturbed run has its own problem, built from the scene that the user's function returns. It therefore includes
-every effect of a parameter (nodes, constants, tools, friction, targets, temperatures). A state of the base run
-satisfies equilibrium F = 0 and a constraint c = 0, with the tangent K = dF/dx. Near it a perturbed run solves its own
-equilibrium F' = 0 and constraint c' = 0 by modified Newton iterations:
-
-.. math::
-    K \, dx + F_\lambda \, d\lambda = -F', \qquad c_x \, dx + c_\lambda \, d\lambda = -c'
-
-with the unknowns x and the control :math:`\lambda`. Without contact, two runs are perturbed, by +dp and -dp of a
-parameter p. The derivative of an output quantity by p is its difference between both over 2 dp, with an error of second
-order in dp.
+every effect of a parameter (nodes, constants, tools, friction, targets, temperatures). Near a state of the base run it
+solves its own equilibrium and constraint (`solve_perturbed`). Without contact, two runs are perturbed, by +dp and -dp
+of a parameter p. The derivative of an output quantity by p is its difference between both over 2 dp, with an error of
+second order in dp.
 """
 
 from __future__ import annotations

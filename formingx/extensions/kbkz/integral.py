@@ -1,15 +1,9 @@
 r"""Stress of a material as an integral over all its past states, at points: `KBKZ` in a scene.
 
-With Cbar = J^(-2/3) C and the past states C_k at reduced ages, the second Piola-Kirchhoff stress is, up to a pressure,
-
-.. math::
-    S = \sum_k W_k \, h(I_1, I_2) \, C_k^{-1}, \qquad I_1 = \bar C : C_k^{-1}, \quad I_2 = \bar C^{-1} : C_k, \quad
-    W_k = \sum_j G_j w_{kj}
-
-with the weights w_kj of relaxation mode j. They are exact if h C_k^-1 is linear in the age between states. The first
-state, undeformed, represents all earlier time; the last one contributes only a pressure. In a form S is linear in Cbar
-and in the time step, exact where it is refreshed, with the consistent tangent. A symmetric tensor is stored as its
-entries (11, 22, 12, 33); arrays have shape (4, n).
+The weight of past state k in the sum of `MemoryIntegral` is the sum of G_j w_kj over the relaxation modes j. The
+weights w_kj are exact if h C_k^-1 is linear in the age between states. The first state, undeformed, represents all
+earlier time; the last one contributes only a pressure. In a form S is linear in Cbar and in the time step, exact where
+it is refreshed, with the consistent tangent.
 """
 
 from typing import Any
