@@ -1,4 +1,4 @@
-r"""Exact solutions for comparison: the inflated circular membrane, the thick tube and the thick sphere.
+"""Exact solutions for comparison: the inflated circular membrane, the thick tube and the thick sphere.
 
 **Membrane** (Adkins and Rivlin, Phil. Trans. R. Soc. A 244 (1952) 505-531): the equations of `membrane_inflation` are
 integrated from the pole until the circumferential stretch is 1. Only the product p R enters, so this point is the rim

@@ -1,4 +1,4 @@
-r"""Membranes under a plug, solved by ordinary differential equations, for comparison.
+"""Membranes under a plug, solved by ordinary differential equations, for comparison.
 
 A flat circular membrane with a fixed rim is pushed by a flat plug of radius r_p.
 

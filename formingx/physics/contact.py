@@ -1,14 +1,14 @@
-r"""Contact of a face of the body with a rigid tool: penalty, regularised ramp, and three laws of friction.
+"""Contact of a face of the body with a rigid tool: penalty, regularised ramp, and three laws of friction.
 
 `formingx.physics.contact_law.Law` states the tractions, per unit reference area. The elastic slip g is the tangential
-motion since gap closure, minus the sliding. Stick is mu = inf, frictionless contact mu = 0. For a point that was open at
-the last accepted state, the slip counts from the position of its gap closure. The tangent of the path predicts this
+motion since gap closure, minus the sliding. Stick is mu = inf, frictionless contact mu = 0. For a point that was open
+at the last accepted state, the slip counts from the position of its gap closure. The tangent of the path predicts this
 position. A point whose gap closes at the end of the step, or later, carries no shear until then.
 
 Unlike Song (1993), eq. (5.9), Coulomb's law is regularised: points slide after the same small elastic slip g_s at every
-pressure. Their stiffness therefore grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the elastic
-stick of the Abaqus Theory Manual, section 5.2.3). Sliding dissipates energy. Elastic slip has no energy while N changes.
-Slip under N1 and back under N2 gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
+pressure. Their stiffness therefore grows with the pressure (Wriggers, Computational Contact Mechanics, 2006; the
+elastic stick of the Abaqus Theory Manual, section 5.2.3). Sliding dissipates energy. Elastic slip has no energy while N
+changes. Slip under N1 and back under N2 gains at most mu (N2 - N1) g_s/2 per area, which vanishes with g_s.
 
 For a tool from which the body does not separate, a point that has been in contact has F(d) = d + theta of either sign.
 The other points have max(d + theta, 0), which is continuous at gap closure.
