@@ -24,13 +24,10 @@ def expected_stretches(body: Any) -> Iterator[tuple[str, float]]:
 
 
 def _cap_stretch(target: Any, radius: float) -> float | None:
-    r"""Return the pole stretch of a disc of radius a, inflated to a spherical cap of height H that meets a target.
+    """Return 1 + (H/a)^2 at the pole of a disc of radius a blown to a cap of height H that meets a target, or None.
 
-    The points of the thin disc move at right angles to the successive caps, so
-
-    .. math:: \lambda = 1 + (H / a)^2
-
-    The target is a pole stretch, a pole height or an enclosed volume; for any other None is returned.
+    The points of the thin disc move at right angles to the successive caps. A target is a pole stretch or height, or a
+    volume.
     """
     if target.name == "pole_stretch":
         return float(target.value)

@@ -193,12 +193,9 @@ def _contact_penalties(body: SizedBody) -> Iterator[Finding]:
 
 @register("scene")
 def _volume_penalty(body: SizedBody) -> Iterator[Finding]:
-    r"""Report a volume penalty eps with a volume change above 1 %, or with a tangent that is known to fail.
+    """Report a volume penalty eps with a volume change above 1 %, or with a tangent that is known to fail.
 
-    At a stretch lambda the pressure is about mu lambda^2, with the shear modulus mu, and the bulk modulus is 8 mu/eps.
-    So the relative change of volume is about
-
-    .. math:: \epsilon \lambda^2 / 8
+    At a stretch l the pressure is about mu l^2 and the bulk modulus 8 mu/eps, so the volume changes by about eps l^2/8.
     """
     model = body.scene.model
     if not model.solid:

@@ -92,11 +92,9 @@ def series(slab: Slab, start: float, h: tuple[float, float], air: tuple[float, f
 
 
 def _steady(slab: Slab, h: tuple, air: tuple, source: Callable | None) -> Callable:
-    r"""Return the steady temperature T_s of a slab as a function of x, with convection at both faces.
+    r"""Return the steady temperature T_s(x) of a slab with a source q(x) and convection at both faces.
 
     .. math:: -k T_s'' = q, \qquad k T_s'(0) = h_0 (T_s(0) - T_{air,0}), \qquad -k T_s'(d) = h_1 (T_s(d) - T_{air,1})
-
-    h and air have values of both faces; q is a function of x, power/length^3, or None.
     """
     d, k = slab.thickness, slab.conductivity
     nodes, weights = np.polynomial.legendre.leggauss(60)

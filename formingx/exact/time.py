@@ -196,10 +196,7 @@ class ThickBody:
         return self._strain_rate(s) * ds - self._relaxation_rate(w).ravel()
 
     def _relaxation_rate(self, w: np.ndarray) -> np.ndarray:
-        r"""Return the rates at which the elastic strains w decrease by relaxation, shape (n, branches, 3), 1/time.
-
-        .. math:: \frac{1}{2 \tau} \left(e^{2 w_i} - \frac{1}{3} \sum_j e^{2 w_j}\right)
-        """
+        """Return the rates of relaxation (e^(2 w_i) - (1/3) sum_j e^(2 w_j))/(2 tau), (n, branches, 3), 1/time."""
         m = np.exp(2 * w)
         return (m - m.mean(axis=-1, keepdims=True)) / (2 * self.tau[:, None])
 

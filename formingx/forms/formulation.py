@@ -323,10 +323,7 @@ class Formulation(ABC):
         return sum(v[i] for i in range(self.domain.geometry.dim)) * self.weight / self.constant(self.volume) * dx
 
     def viscosity(self) -> Any:
-        r"""Return the bilinear form of a viscous stress, scaled like the residual (UFL, dimensionless).
-
-        .. math:: \frac{1}{V} \int \dot F : \delta F \, dV
-        """
+        """Return (1/V) int dF/dt : delta F dV, the bilinear form of a viscous stress (UFL, dimensionless)."""
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)
         potential = ufl.inner(F, F) / 2 * self.weight / self.constant(self.volume)
         dx = ufl.dx(self.domain, metadata={"quadrature_degree": 4})

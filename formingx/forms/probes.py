@@ -78,12 +78,7 @@ class Probe:
         return row, -0.5 if self._problem.scene.kinematics.axisymmetric else -1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        r"""Return a vector, owned entries, whose product with x is a weighted sum of the points' displacements.
-
-        .. math:: \text{row} \cdot x = \frac{1}{L} \sum_{i,c} w_{ic} u_{ic}
-
-        factors: weights w_ic of component c of point i, shape (n, components). L is `forms.length`.
-        """
+        """Return the vector, owned entries, with row . x = (1/L) sum_ic w_ic u_ic for factors w, (n, components)."""
         return self._row(factors, self._weights)
 
     def _local(self, values: np.ndarray) -> np.ndarray:
@@ -168,10 +163,7 @@ class MidSurfaceProbe(Probe):
         return self._problem.comm.allreduce(total, MPI.SUM)
 
     def stretch_row(self) -> tuple[np.ndarray, float]:
-        r"""Return the row, shape (n,), and the power 1 for the in-plane stretch at the pole of a membrane.
-
-        .. math:: 1 + \frac{\partial u_r}{\partial R} = 1 + \text{row} \cdot x
-        """
+        """Return the row (n,) of 1 + du_r/dR = 1 + row . x at the pole of a membrane, and the power 1."""
         row = self._row(np.array([[1.0, 0.0], [0.0, 0.0]]), self._slopes[:, 0] * self._problem.forms.length)
         return row, 1.0
 

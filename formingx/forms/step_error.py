@@ -113,11 +113,9 @@ class StepError:
 
 
 class _Stress:
-    r"""Deviatoric Kirchhoff stress of a material at the quadrature points of the energy.
+    r"""Deviatoric Kirchhoff stress of a material, without thermal expansion, at the quadrature points of the energy.
 
     .. math:: \tau = \mathrm{dev} \left( \frac{\partial W}{\partial F} F^T \right)
-
-    W is an energy of the material per reference volume, and F the deformation gradient without thermal expansion.
     """
 
     def __init__(self, forms: Any, terms: Any, energy: Callable):

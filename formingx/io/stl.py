@@ -10,13 +10,7 @@ from .output import replace
 
 
 def volume(points: np.ndarray, triangles: np.ndarray) -> float:
-    r"""Return the volume inside closed surfaces of triangles with the corners a, b and c, length^3.
-
-    .. math:: V = \frac{1}{6} \sum a \cdot (b \times c)
-
-    The corners have shape (n, 3), length, the triangles (m, 3). Clockwise ones, seen from outside, give a negative
-    volume.
-    """
+    """Return the volume sum a . (b x c)/6 in outward triangles (m, 3) of points (n, 3), length^3; inward: negative."""
     a, b, c = (points[triangles[:, k]] - points.mean(0) for k in range(3))
     return float(np.einsum("ni,ni->", a, np.cross(b, c)) / 6)
 

@@ -110,13 +110,7 @@ class Response:
 
 
 def in_plane_stretches(mode: str, stretches: Any) -> np.ndarray:
-    r"""Return both in-plane stretches of a homogeneous test.
-
-    .. math:: l_1 = l, \qquad l_2 = l^k
-
-    Stretches l have shape (n,), and k is -1/2 ("uniaxial"), 0 ("pure_shear") or 1 ("equibiaxial"); the result has shape
-    (2, n).
-    """
+    """Return l and l^k, (2, n), for l (n,): k = -1/2 ("uniaxial"), 0 ("pure_shear") or 1 ("equibiaxial")."""
     l = np.asarray(stretches, float)
     return np.stack([l, l ** MODES[mode]])
 

@@ -18,7 +18,7 @@ from .material import Material
 
 
 class NeoHookean(Material):
-    r"""Neo-Hookean material; its shear modulus is 2 c10.
+    """Neo-Hookean material; its shear modulus is 2 c10.
 
     .. math:: W = c_{10} (I_1 - 3)
 
@@ -46,7 +46,7 @@ class NeoHookean(Material):
 
 
 class MooneyRivlin(Material):
-    r"""Mooney-Rivlin material, eq. (4.1) of Song (1993): c10 belongs to I1, c01 to I2.
+    """Mooney-Rivlin material, eq. (4.1) of Song (1993): c10 belongs to I1, c01 to I2.
 
     .. math:: W = c_{10} (I_1 - 3) + c_{01} (I_2 - 3)
 

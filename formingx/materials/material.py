@@ -197,7 +197,7 @@ class Material(Energies):
         return (P * flat if true else P).reshape(l.shape)[()]
 
     def largest_stretch(self, mode: str) -> float:
-        r"""Return the stretch l of a test at which the energy becomes infinite.
+        """Return the stretch l of a test at which the energy becomes infinite.
 
         .. math:: l^2 + l^{2k} + l^{-2 - 2k} = I_{1,max}
 

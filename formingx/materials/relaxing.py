@@ -374,12 +374,7 @@ class GeneralisedMaxwell(RelaxingMaterial):
 
     @staticmethod
     def _flow(w: np.ndarray) -> np.ndarray:
-        r"""Return the flow law f(w) of branches with elastic logarithmic strains w, both of shape (branches, 3).
-
-        With the principal stretches l of the body and the relaxation time tau, the elastic strains change by
-
-        .. math:: \frac{dw_i}{dt} = \frac{d \ln l_i}{dt} - \frac{f_i(w)}{2 \tau}
-        """
+        """Return the flow law f(w), (branches, 3) each, in dw_i/dt = d(ln l_i)/dt - f_i(w)/(2 tau), stretches l_i."""
         raise NotImplementedError
 
     def __repr__(self) -> str:

@@ -211,9 +211,7 @@ def _mean_decay(x: Any) -> Any:
 
 
 def _parabola_weight(x: Any) -> Any:
-    r"""Return a factor of the weight p in a step of `TransientNetwork` (UFL), by its series for x < 0.01.
-
-    .. math:: \frac{x - 2 + (x + 2) e^{-x}}{x^2}
+    """Return [x - 2 + (x + 2) e^-x]/x^2 (UFL), a factor of p in a step, by its series for x < 0.01.
 
     Here x is the length of the step over the relaxation time. The other factor of p is s/(1 + s), with the ratio s of
     the step to the previous one.

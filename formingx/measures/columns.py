@@ -23,7 +23,7 @@ class _Recorded(Quantity):
 
 
 class _Scalar(_Recorded):
-    r"""Quantity :math:`f(I)` of an integral I: `form` is the UFL form of I, of rank 0, and `function` is f."""
+    """Quantity :math:`f(I)` of an integral I: `form` is the UFL form of I, of rank 0, and `function` is f."""
 
     def __init__(self, problem, form, function):
         self._problem, self._form, self._function = problem, problem.forms.compile(form), function

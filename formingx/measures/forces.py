@@ -13,13 +13,7 @@ from .targets import Target
 
 
 def positive_direction(contact: Any) -> np.ndarray:
-    r"""Return the direction in which the force of the body on a tool counts as positive.
-
-    .. math:: -\frac{m}{|m|}
-
-    The result has shape (components,), and is +Z for a fixed tool. m is the motion per travel
-    (`Contact.travel_vector`).
-    """
+    """Return -m/|m|, (components,), the direction of positive forces by the `travel_vector` m; +Z for a fixed tool."""
     up = np.eye(contact.tool.components)[-1]
     return up if contact.direction is None else -contact.travel_vector / np.linalg.norm(contact.travel_vector)
 

@@ -28,7 +28,7 @@ class Quantity:
         raise NotImplementedError
 
     def equation(self, target: float) -> Any:
-        r"""Return the equation c(x, lambda) = 0 that the quantity equals a target value, in the user's units.
+        """Return the equation c(x, lambda) = 0 that the quantity equals a target value, in the user's units.
 
         It is a function of the unknowns x, the control lambda and a PETSc vector. It returns c and dc/dlambda, both
         dimensionless, and sets the vector to dc/dx.
@@ -110,10 +110,7 @@ class Form(Quantity):
 
 
 class Sag(Quantity):
-    r"""Largest downward displacement of a node, from the reference configuration of the first mesh of a run, length.
-
-    .. math:: \max(0, \max_i(-u_{z,i}))
-    """
+    """Largest downward displacement, max(0, max_i(-u_z,i)), of a node from the first mesh of a run, length."""
 
     smooth = False
 

@@ -279,12 +279,9 @@ def bind_pole_height(problem: Any) -> Quantity:
 
 
 def bind_pole_stretch(problem: Any) -> Quantity:
-    r"""Return the in-plane stretch of the sheet at the pole, on the axis, as an output quantity.
+    """Return the in-plane stretch at the pole, (h/h_0)^(-1/2), in plane strain (h/h_0)^-1, as an output quantity.
 
-    .. math:: \lambda = (h / h_0)^{-1/2} \text{ (axisymmetric)}, \qquad \lambda = (h / h_0)^{-1} \text{ (plane strain)}
-
-    Here h is the current thickness on the axis, h_0 the thickness on the first mesh of the run. In a membrane the
-    stretch is 1 + du_r/dR.
+    Here h is the thickness on the axis, h_0 that on the first mesh of the run. In a membrane it is 1 + du_r/dR.
     """
     low, high = _pole(problem)
     pole = probe(problem, [(0.0, low), (0.0, high)])
@@ -355,10 +352,5 @@ def _pole(problem):
 
 
 def is_met(target: Target, size: float, value: float) -> bool:
-    r"""Check whether the value v of an output quantity equals its target v* to round-off.
-
-    .. math:: |v - v^*| \le 10^{-12} \max(|v|, |v^*|, size)
-
-    `size` is the scale of the quantity, in the user's units (`Quantity.size`).
-    """
+    """Return True if |v - v*| <= 1e-12 max(|v|, |v*|, size), with `Quantity.size`, in the user's units."""
     return abs(value - target.value) <= 1e-12 * max(abs(value), abs(target.value), size)

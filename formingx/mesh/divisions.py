@@ -108,10 +108,7 @@ def is_sequence(values: Any) -> bool:
 
 
 def graded_ends(along: int, grading: float) -> np.ndarray:
-    r"""Return the ends of elements on [0, 1] whose sizes form a geometric progression, shape (along + 1,).
-
-    .. math:: h_i \propto g^{i/(n - 1)}, \qquad i = 0, \dots, n - 1
-    """
+    """Return the ends (n + 1,) of n elements on [0, 1] whose sizes are in proportion to grading^(i/(n - 1))."""
     sizes = grading ** (np.arange(along) / max(along - 1, 1))
     ends = np.concatenate([[0.0], np.cumsum(sizes)])
     return ends / ends[-1]

@@ -14,12 +14,7 @@ def length_along(line: np.ndarray) -> np.ndarray:
 
 
 def number_of_columns(s: np.ndarray, size: np.ndarray) -> np.ndarray:
-    r"""Return the number of columns of elements from the first point of a sheet to each point, a real number.
-
-    .. math:: n(s) = \int_0^s \frac{ds'}{h(s')}
-
-    The trapezoidal rule is used; lengths s and sizes have shape (n,).
-    """
+    """Return the integral of ds/h to each length s, (n,), with sizes h, (n,), of columns, by the trapezoidal rule."""
     return np.concatenate([[0.0], np.cumsum(np.diff(s) * (1 / size[1:] + 1 / size[:-1]) / 2)])
 
 

@@ -58,12 +58,9 @@ def place(mesh: Mesh, point: Any, layer: str = "") -> Place:
 
 
 def shape_quality(corners: np.ndarray) -> np.ndarray:
-    r"""Return the shape quality q of triangles with the area A and the edges l_1, l_2, l_3.
+    """Return 4 sqrt(3) area/(l_1^2 + l_2^2 + l_3^2), (n,), of triangles, corners (n, 3, 2 or 3), length.
 
-    .. math:: q = \frac{4 \sqrt{3} \, A}{l_1^2 + l_2^2 + l_3^2}
-
-    It is 1 for an equilateral triangle, 0 for a flat one, and negative for a clockwise one. Corners have shape (n, 3,
-    2), in three dimensions (n, 3, 3), length, where q is positive; the result has shape (n,).
+    It is 1 for an equilateral triangle, 0 for a flat one, and in the plane negative for a clockwise one.
     """
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     if corners.shape[2] == 3:

@@ -262,7 +262,7 @@ class ContactLaw:
         raise NotImplementedError
 
     def ramp(self, d: np.ndarray, bonded: np.ndarray | bool = False) -> tuple[np.ndarray, np.ndarray]:
-        r"""Return the function F(d) of the normal traction, and its derivative; by default 0.
+        """Return the function F(d) of the normal traction, and its derivative; by default 0.
 
         .. math:: N = k F(d)
 
@@ -347,7 +347,7 @@ class ContactLaw:
 
 
 class NormalLaw(ContactLaw):
-    r"""Contact law without friction and history: the normal traction N follows from the signed distance d.
+    """Contact law without friction and history: the normal traction N follows from the signed distance d.
 
     .. math:: N = k F(d)
 
@@ -542,11 +542,9 @@ class Law(NormalLaw):
         return F, slope
 
     def depth(self, pressure: np.ndarray) -> np.ndarray:
-        r"""Return the signed distance, shape (n,), length, at which the normal traction is N, shape (n,), stress.
+        r"""Return the signed distance of points with the normal traction N, (n,), length; N/k - theta if inseparable.
 
         .. math:: d = \begin{cases} N/k & N > k \theta \\ 2 \sqrt{N \theta / k} - \theta & \text{else} \end{cases}
-
-        For a contact that does not separate, d is N/k - theta.
         """
         over = pressure / (self.k * self.theta)
         return self.theta * ((np.where(over > 1, over, 2 * np.sqrt(over) - 1)) if not self.adhesive else over - 1)
@@ -620,12 +618,9 @@ class Law(NormalLaw):
         return out
 
     def hoop_stiffness(self, x: np.ndarray, old: ContactHistory | None, radius: np.ndarray) -> np.ndarray:
-        r"""Return the derivative of the hoop traction by the hoop displacement, shape (n,), stress/length.
+        """Return N n_r/r, (n,), stress/length: traction, radial normal, radius r (n,), inf in plane strain.
 
-        .. math:: \frac{N n_r}{r}
-
-        N is the normal traction, n_r the radial component of the normal of the tool. The stiffness of the elastic slip
-        is added for a sticking point. radius: deformed, shape (n,), length; infinite in plane strain.
+        The stiffness of the elastic slip is added for a sticking point.
         """
         turned = super().hoop_stiffness(x, old, radius)
         if not self.has_friction:

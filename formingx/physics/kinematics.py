@@ -278,12 +278,7 @@ def _along_z(X):
 
 
 def volume_ratio(F):
-    r"""Return the volume ratio of a deformation gradient F (UFL, shape (3, 3)), a UFL scalar.
-
-    .. math:: J = \det F
-
-    Products that vanish for an F with block structure are left out.
-    """
+    """Return J = det F (UFL), F of shape (3, 3), without products that vanish for its block structure."""
     J = F[2, 2] * (F[0, 0] * F[1, 1] - F[0, 1] * F[1, 0])
     if is_block(F):
         return J
@@ -308,10 +303,7 @@ def in_section_order(F):
 
 
 def invariants(F):
-    r"""Return the first two invariants of C = F^T F (UFL scalars), for F of shape (3, 3).
-
-    .. math:: I_1 = \mathrm{tr}\, C, \qquad I_2 = \tfrac{1}{2} (I_1^2 - \mathrm{tr}\, C^2)
-    """
+    """Return I1 = tr C and I2 = (I1^2 - tr C^2)/2 of C = F^T F (UFL scalars), for F of shape (3, 3)."""
     C = F.T * F
     I1 = ufl.tr(C)
     return I1, (I1**2 - ufl.inner(C, C)) / 2

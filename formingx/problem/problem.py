@@ -189,12 +189,7 @@ class Problem:
         return multipliers
 
     def inner(self, a: PETSc.Vec, b: PETSc.Vec) -> float:
-        r"""Return the inner product of two displacement fields over L, by a lumped mass matrix; dimensionless.
-
-        .. math:: \frac{1}{V} \int_V a \cdot b \, dV
-
-        V is the reference volume. Pressures and multipliers do not count.
-        """
+        """Return (1/V) int a . b dV of two displacement fields over L, by a lumped mass matrix; dimensionless."""
         return self._dot(self._metric * a.array_r[: self.n_owned], b.array_r[: self.n_owned])
 
     def metric_times(self, a: PETSc.Vec, out: PETSc.Vec) -> None:

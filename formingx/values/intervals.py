@@ -10,14 +10,10 @@ UNDETERMINED = 0.5
 
 def t_intervals(constants: Mapping[str, float], errors: Mapping[str, float], points: int, confidence: float
                 ) -> dict[str, tuple[float, float]]:
-    r"""Return confidence intervals of the constants of a least-squares fit.
+    """Return {constant: (low, high)} at c -/+ t s, for values c and standard errors s of least squares.
 
-    With the fitted value c of a constant, its standard error s, n measured points and m constants, the ends are
-
-    .. math:: c \pm t_{n-m} \, s
-
-    Here t is the quantile of Student's t distribution with n - m degrees of freedom, at least one. The result is
-    {constant: (lower end, upper end)}. A confidence level outside (0, 1) is an InputError.
+    Here t is the quantile of Student's t distribution with n - m degrees of freedom, at least one, for n points and m
+    constants. A confidence level outside (0, 1) is an InputError.
     """
     from scipy.stats import t
     width = t.ppf((1 + fraction("intervals: confidence", confidence)) / 2, max(points - len(constants), 1))

@@ -1,4 +1,4 @@
-r"""Perturbed runs: copies of a run with one parameter slightly changed, solved with the LU factors of the run.
+"""Perturbed runs: copies of a run with one parameter slightly changed, solved with the LU factors of the run.
 
 Each perturbed run has its own problem, built from the scene that the user's function returns. It therefore includes
 every effect of a parameter (nodes, constants, tools, friction, targets, temperatures). Near a state of the base run it

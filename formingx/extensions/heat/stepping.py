@@ -56,10 +56,7 @@ def step(body: Conduction, state: list[np.ndarray], dt: float) -> Step:
 
 
 def next_length(dt: float, error: float, tolerance: float) -> float:
-    r"""Return the length of the next step from the error of the last one, with a safety factor of 0.9.
-
-    .. math:: dt \; \min(\max(0.9 (tolerance/error)^{1/3}, 0.1), 5)
-    """
+    """Return dt min(max(0.9 (tolerance/error)^(1/3), 0.1), 5), the length of the next step."""
     return dt * float(np.clip(0.9 * (tolerance / max(error, 1e-300)) ** (1 / 3), 0.1, 5.0))
 
 

@@ -1,4 +1,4 @@
-r"""Stress of a material as an integral over all its past states, at points: `KBKZ` in a scene.
+"""Stress of a material as an integral over all its past states, at points: `KBKZ` in a scene.
 
 The weight of past state k in the sum of `MemoryIntegral` is the sum of G_j w_kj over the relaxation modes j. The
 weights w_kj are exact if h C_k^-1 is linear in the age between states. The first state, undeformed, represents all

@@ -340,12 +340,9 @@ def relaxed(F: Any) -> Any:
 
 
 def smaller_stress(stretches: np.ndarray) -> np.ndarray:
-    r"""Return the smaller principal stress of a neo-Hookean membrane over its shear modulus, shape (n,).
+    """Return l2^2 - (l1 l2)^-2, (n,), of stretches (n, 2), l1 first: the smaller neo-Hookean stress over modulus.
 
-    .. math:: \lambda_2^2 - (\lambda_1 \lambda_2)^{-2}
-
-    stretches: principal stretches in the surface, the larger first, shape (n, 2). In compression it is negative for
-    other materials, too.
+    In compression it is negative for other materials, too.
     """
     return stretches[:, 1] ** 2 - stretches.prod(axis=1) ** -2
 

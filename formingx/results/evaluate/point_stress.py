@@ -85,7 +85,7 @@ class Stress:
         return np.sort(np.column_stack([mean + radius, mean - radius, s[:, 2, 2]]))[:, ::-1]
 
     def on_face(self, normal: Any) -> FaceStress:
-        r"""Return the Cauchy stress on material faces through the points.
+        """Return the Cauchy stress on material faces through the points.
 
         The unit normal n of a deformed face follows from its reference normal N (Nanson's formula):
 

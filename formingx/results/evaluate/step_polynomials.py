@@ -39,10 +39,5 @@ def interpolate(a: Any, b: Any, start: Any = None, end: Any = None) -> Polynomia
 
 
 def integral(f: Polynomial, y: Polynomial) -> float:
-    r"""Return the integral of a force over a travel, exact if both are cubics in s.
-
-    .. math:: \int_0^1 \sum_i f_i \, \frac{dy_i}{ds} \, ds
-
-    Values of both polynomials are numbers, or arrays of the same shape.
-    """
+    """Return the integral of f . dy/ds over s from 0 to 1, exact for cubics of numbers or arrays of one shape."""
     return float(sum(w * np.sum(f.value(s) * y.slope(s)) for s, w in zip(*GAUSS)))

@@ -115,12 +115,7 @@ class ColumnConduction:
         return [R, *found], self._heats(fluxes, through)
 
     def stage(self, state: list[np.ndarray], known: list[np.ndarray], c: float, guess: np.ndarray) -> ImplicitStage:
-        r"""Solve an implicit stage of a time step for columns and tools.
-
-        .. math:: M \Delta = k + c R(y + \Delta)
-
-        `state` (y) and `known` (k) are temperature states; c is in units of time; `guess` is not used.
-        """
+        """Solve M Delta = k + c R(y + Delta) for columns and tools, with y `state`, k `known` and c in time."""
         T = state[0]
         responses = [touch.response(excess, k, c) for touch, excess, k in zip(self.tool_contacts, state[1:], known[1:])]
         sources = sum(self._absorbed) + self.power
@@ -137,12 +132,7 @@ class ColumnConduction:
         return ImplicitStage(changes, [R, *rates], self._heats(fluxes, through))
 
     def difference(self, known: list[np.ndarray], c: float) -> tuple[float, np.ndarray]:
-        r"""Return the effect of heats k, as for an implicit stage, by linearised equations.
-
-        .. math:: M \Delta = k + c R' \Delta
-
-        The results are the largest absolute change on all ranks, and the change of the columns, shape (n, m), degrees.
-        """
+        r"""Solve M Delta = k + c R' Delta; return the largest change on all ranks and the columns', (n, m), degrees."""
         responses = [touch.response(0 * k, k, c, absolute=False) for touch, k in zip(self.tool_contacts, known[1:])]
         laws = [law.linearised() for law in self._laws]
         change, _ = self._solve(0 * known[0], known[0], c, laws, responses)
