@@ -23,10 +23,7 @@ The header of THEIRS names its columns and may state units: pressure [psi]."""
 
 
 def main(arguments: list[str] | None = None) -> int:
-    """Run the command of `python3 -m formingx` with some words, None: those of this process.
-
-    Return the exit status: 0, or 2 for an argument that is not allowed.
-    """
+    """Run the command with `arguments`, None: those of this process; return the exit status, 2 for a wrong argument."""
     words = sys.argv[1:] if arguments is None else list(arguments)
     try:
         if words[:1] == ["demo"]:

@@ -99,10 +99,7 @@ class Admissible:
         return max(listed(self._forms.comm, found), key=lambda part: abs(np.log(max(part.value, 1e-300))))
 
     def volume_error_away(self, places: np.ndarray, distance: float) -> float:
-        """Return the volume-weighted root mean square of J - 1 away from places, shape (k, 2), length; collective.
-
-        Elements with a quadrature point within `distance` are left out; 0 if none is left.
-        """
+        """Return the root mean square of J - 1 in elements over `distance` from places (k, 2), length; collective."""
         X, n = self._X[:, : self._n], self._n
         J = np.prod(list(self.quantities().values()), axis=0)[:, :n]
         near = np.min([np.hypot(*(X - place).transpose(2, 0, 1)).min(1) for place in places], axis=0) < distance

@@ -64,10 +64,7 @@ class History(Protocol):
 
 @runtime_checkable
 class ConstitutiveHistory(History, Protocol):
-    """Interface of the history variables of one material of the body.
-
-    rate_dependent: True if the stress depends on time, False if on past strains alone.
-    """
+    """History variables of one material; `rate_dependent`: the stress depends on time, not on past strains alone."""
 
     rate_dependent: bool
 

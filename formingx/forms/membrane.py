@@ -55,10 +55,7 @@ class MidSurface(Formulation):
                          " MixedPressure()")
 
     def face(self, name: str, quadrature_degree: int) -> tuple[Any, ufl.Measure]:
-        """Return the normal away from a loaded whole face (UFL, shape (2,)), and the measure of the mid-surface.
-
-        Raise `InputError` if the boundary is not the whole lower or upper face.
-        """
+        """Return the normal (UFL, (2,)) away from a whole face, else an InputError, and the mid-surface's measure."""
         nodes = self.scene.mesh.nodes_of(name)
         near = 1e-8 * self.length
         whole = len(nodes) and np.allclose([nodes[0, 0], nodes[-1, 0]], [self._R[0], self._R[-1]], rtol=0, atol=near)
@@ -70,10 +67,7 @@ class MidSurface(Formulation):
                          f" only")
 
     def constraints(self, support: Any) -> list[Any]:
-        """Return the constraints that a support at an end of the membrane imposes on the displacement.
-
-        A mean over an end becomes its single point. Raise `InputError` elsewhere.
-        """
+        """Return the constraints of a support at an end, whose mean is a single point; elsewhere: InputError."""
         items = [c if isinstance(c, Constrained) else Constrained(c.component, on=c.on) for c in support.constraints()]
         for item in items:
             if item.on is not None and item.on not in self.mesh.boundaries:
@@ -174,10 +168,7 @@ class MidSurface(Formulation):
         return self.scene.kinematics.weight(self.X) * self._tangent[0]
 
     def _deformation_gradient(self) -> Any:
-        """Return the deformation gradient diag(l1, 1/(l1 l2), l2) in principal axes: meridian, normal, hoop.
-
-        l1 and l2 are the principal stretches along the meridian and along the circumference.
-        """
+        """Return diag(l1, 1/(l1 l2), l2), with the stretches along meridian, normal and circumference (hoop)."""
         F = self.scene.kinematics.deformation_gradient(self.u, self.X)         # of the surface: its normal is kept
         t = F * ufl.as_vector([self._tangent[0], self._tangent[1], 0])
         l1, l2 = ufl.sqrt(ufl.inner(t, t)), F[2, 2]

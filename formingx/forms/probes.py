@@ -168,10 +168,7 @@ class MidSurfaceProbe(Probe):
         return row, 1.0
 
     def row(self, factors: np.ndarray) -> np.ndarray:
-        """Return the row of `Probe.row`, for weights of the displacement on the mid-surface, shape (n, components).
-
-        Raise `InputError` if a point is not on the mid-surface.
-        """
+        """Return the row of `Probe.row` for factors (n, components) on the mid-surface; elsewhere: InputError."""
         middle = self._problem.forms.nearest(self.points)
         outside = np.abs(self.points - middle).max(axis=1) > 1e-8 * self._problem.forms.length
         if np.any(outside):

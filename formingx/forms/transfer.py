@@ -58,10 +58,7 @@ class MovingLeastSquares:
 
 
 def restrict_fields(source: Any, state: Any, problem: Any) -> None:
-    """Set the fields of a problem on part of a mesh from a state on the whole mesh; collective.
-
-    The transfer is exact, cell by cell: displacements are quadratic with a bubble, pressures linear.
-    """
+    """Set fields on part of a mesh from a state on the whole mesh, exactly, cell by cell; collective."""
     whole, part = source.forms, problem.forms
     domain = whole.domain
     with source.state_context(state):

@@ -149,10 +149,7 @@ def _decoded(content: bytes) -> str:
 
 
 def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
-    """Return pairs (line number, line) of the lines of a file, without empty lines and comments.
-
-    A comment is a line that begins with #. Between a quote and its end, all lines are kept.
-    """
+    """Return (line number, line) of lines that are not empty and do not begin with #, and of all lines in a quote."""
     found, quoted = [], False
     for n, line in enumerate(lines, 1):
         if quoted or line.strip() and not line.lstrip().startswith("#"):
@@ -162,10 +159,7 @@ def _without_remarks(lines: list[str]) -> list[tuple[int, str]]:
 
 
 def from_arrays(name: str, columns: Mapping[str, Any]) -> CsvTable:
-    """Return a table of {column: values, shape (n,)}, n at least 2, without units; `name` is for messages.
-
-    Values that are no numbers, or of other lengths, are an InputError.
-    """
+    """Return a table of {column: values (n,)}, n at least 2, without units; others are an InputError by `name`."""
     arrays = {}
     for key, values in columns.items():
         try:

@@ -80,10 +80,7 @@ class Varying(ABC):
 
 
 class OfPosition(Varying):
-    """Material constant that is a function f(R, Z) of the reference position.
-
-    The function takes two arrays, shape (n,), length, and returns the constant, shape (n,).
-    """
+    """Material constant f(R, Z), a function of two arrays (n,), length, that returns the constant, (n,)."""
 
     def __init__(self, function: Callable):
         self.function = function

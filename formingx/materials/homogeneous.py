@@ -201,10 +201,7 @@ def stability(response: Response, constants: Any, low: float, high: float) -> Ma
 
 
 class _Program:
-    """Scalar UFL expressions as a list of numpy operations, with common parts evaluated once.
-
-    The inputs are three stretches, then the constants of an energy.
-    """
+    """UFL expressions of three stretches and constants as numpy operations; common parts are evaluated once."""
 
     def __init__(self, inputs: list, outputs: list):
         place: dict[Any, int] = {c: i for i, c in enumerate(inputs)}

@@ -43,10 +43,7 @@ def overlapping(low: np.ndarray, high: np.ndarray) -> Iterator[tuple[np.ndarray,
 
 
 def _morton_codes(points: np.ndarray) -> np.ndarray:
-    """Return the positions of points, shape (n, 2), on Morton's space-filling curve, integers, shape (n,).
-
-    Points that follow each other on the curve are mostly close together in the plane.
-    """
+    """Return positions (n,) of points (n, 2) on Morton's curve, integers: neighbours are mostly close together."""
     size = np.ptp(points, axis=0).max() or 1.0
     grid = ((points - points.min(0)) / size * (2**16 - 1)).astype(np.int64)
     for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):

@@ -183,10 +183,7 @@ def _groups(curvature: np.ndarray) -> list[np.ndarray]:
 
 
 def _free_radii(tool: Any, x: np.ndarray, normal: np.ndarray, largest: float) -> np.ndarray:
-    """Return the radius of the largest ball outside the tool at points x, (m, 2), shape (m,), length.
-
-    Normals into the tool have shape (m, 2); `largest` bounds the radii.
-    """
+    """Return the radius (m,), at most `largest`, of the largest ball outside the tool at points x (m, 2), length."""
     low: np.ndarray = np.zeros(len(x))
     high: np.ndarray = np.full(len(x), largest)
     for _ in range(40):

@@ -193,10 +193,7 @@ def _sections(data: bytes, file: str) -> Iterator[tuple[str, bytes]]:
 
 
 def _format(body: bytes, file: str) -> tuple[str, bool, str, int]:
-    """Return (version, True if binary, byte order "<" or ">", bytes of a count) from the section $MeshFormat.
-
-    A count has 4 or 8 bytes. Another version is an InputError.
-    """
+    """Return (version, True if binary, "<" or ">", bytes of a count) from $MeshFormat; others are an InputError."""
     words = body.split(b"\n")[0].decode("ascii", "replace").split()
     if len(words) != 3 or words[0] not in ("2.2", "4.1") or words[1] not in ("0", "1") or words[2] not in ("4", "8"):
         raise InputError(f"mesh file {file!r}: format {' '.join(words)[:40]!r}: must be MSH 2.2 or 4.1 (gmsh:"

@@ -25,10 +25,7 @@ def axes(domain: Any) -> str:
 
 
 def arguments(function: Callable, coordinates: Mapping[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Return the coordinates, {name: values (n,), length}, that a function of the reference position takes.
-
-    They are the first ones, as many as it has positional arguments without a default.
-    """
+    """Return the leading coordinates, {name: values (n,), length}, that a function takes without a default."""
     try:
         taken = list(inspect.signature(function).parameters.values())
     except (TypeError, ValueError):                         # a function of NumPy, for example, has no signature

@@ -652,10 +652,7 @@ class Law(NormalLaw):
         return np.where((press > 0)[:, None, None], pressed.stiffness, now.stiffness)
 
     def _slip(self, x: np.ndarray, near: Nearest, old: ContactHistory) -> tuple[np.ndarray, np.ndarray]:
-        """Return the elastic slip that sticking points would have at x, shape (n,), and its gradient, shape (n, 2).
-
-        The result is stored for repeated calls. near: result of `nearest` at x.
-        """
+        """Return the slip (n,) that sticking points would have at x, and its gradient (n, 2); it is stored."""
         if self._slid is None or self._slid[0] is not near or self._slid[1] is not old:
             g, dg = np.empty(len(x)), np.empty((len(x), 2))
             _C.elastic_slips(len(x), self.theta, x, near.normal, near.curvature, *old, g, dg)

@@ -276,10 +276,7 @@ class Problem:
             return self.admissible.extreme_volume_ratio()
 
     def volume_error_away(self, state: Any, places: np.ndarray, distance: float) -> float:
-        """Return the volume-weighted root mean square of J - 1 away from places, shape (k, 2), length; collective.
-
-        Elements with a quadrature point within `distance` are left out.
-        """
+        """Return the root mean square of J - 1 in elements over `distance` from places (k, 2), length; collective."""
         with self.state_context(state):
             return self.admissible.volume_error_away(places, distance)
 
@@ -347,10 +344,7 @@ class Problem:
 
     @property
     def fading_forces(self) -> np.ndarray | None:
-        """Unbalanced forces f of changed items, shape (n,), dimensionless, or None.
-
-        The residual loses (1 - control) f.
-        """
+        """Unbalanced forces f of changed items, (n,), dimensionless, or None: the residual loses (1 - control) f."""
         return None if self._stage.unbalanced is None else self._stage.unbalanced[: self.n_owned]
 
     def enter(self, setting: StepData, x: np.ndarray, control: float) -> None:
@@ -392,10 +386,7 @@ class Problem:
         return points if state_transfer is None else state_transfer.followed(self, points)
 
     def update_temperature(self) -> None:
-        """Update material constants and friction to a changed temperature; collective.
-
-        Raise `InputError` if one has no value there.
-        """
+        """Update material constants and friction to a changed temperature, else raise an InputError; collective."""
         call_on_all_ranks(self.comm, [self.forms.update_temperature,
                                       *(contact.update_temperature for contact in self.contacts)])
 

@@ -154,10 +154,7 @@ class WallObjective:
 
 
 class MeasuredWallObjective(WallObjective):
-    """Least-squares objective of a search: a measured wall thickness, and possibly a prescribed volume.
-
-    The residuals are the relative deviations of the wall at the measured points of the part.
-    """
+    """Least-squares objective of a search: relative deviations from a measured wall, and possibly a volume."""
 
     damping = MEASURED_ACCURACY
 

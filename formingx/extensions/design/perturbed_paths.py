@@ -153,10 +153,7 @@ class _PerturbedPaths:
             self._velocity = [face.relative_motion(b, 1.0) for face in self.problem.contacts]
 
     def _keep_open(self, state: State) -> None:
-        """Set the contact points that are open in the base run at a state to stay open in all perturbed runs.
-
-        Points whose gap closes at the end of the step stay open too, in the base run and in the perturbed runs.
-        """
+        """Keep contact points open in all perturbed runs that are open in the base run, or close as the step ends."""
         n = self.problem.n_owned
         for face, closing, *others in zip(self.problem.contacts, self._closing,
                                           *(run.problem.contacts for run in self.runs)):

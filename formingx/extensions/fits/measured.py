@@ -246,10 +246,7 @@ def _converted(caller: str, points: list[dict[str, Any]], units: dict[str, Any],
 
 
 def _test_numbers(points: list[dict[str, Any]]) -> list[int]:
-    """Return for each row of a file the number of its test, counted from 0.
-
-    A test ends where its name or its temperature changes, or the time decreases.
-    """
+    """Return the test of each row, from 0; one ends where its name or temperature changes, or the time decreases."""
     found, n = [], 0
     for point, last in zip(points, [points[0], *points]):
         n += (point["test"] != last["test"] or point.get("temperature") != last.get("temperature")

@@ -175,10 +175,7 @@ def _hull(points: np.ndarray) -> np.ndarray:
         return np.array(ordered)
 
     def half(chain: Any) -> list[tuple[float, float]]:
-        """Return the corners of one half of the hull, without the last.
-
-        chain: all points (x, y) in ascending order, for the lower half, or in descending order, for the upper half.
-        """
+        """Return a half of the hull without its last corner: the lower from ascending, the upper from descending."""
         found: list[tuple[float, float]] = []
         for x, y in chain:
             while len(found) > 1 and ((found[-1][0] - found[-2][0]) * (y - found[-2][1])

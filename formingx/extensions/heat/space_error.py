@@ -18,10 +18,7 @@ from .contact import HeatContact
 
 
 class SpaceError:
-    """Estimator of the discretisation error of the temperatures of a body with quadratic elements.
-
-    `body` is its heat equation, `finer` the same one with cubic elements, which `destroy` frees.
-    """
+    """Estimator of the error of a body's temperatures by `finer`, with cubic elements, which `destroy` frees."""
 
     def __init__(self, body: Conduction, finer: Conduction):
         self._body, self._finer = body, finer

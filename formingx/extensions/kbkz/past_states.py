@@ -115,10 +115,7 @@ class PastStates:
         self._refreshed = C, step
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Add the present state of the forms to the past states, and drop states without effect on the stress.
-
-        The control gives the time; x and `start` are not used.
-        """
+        """Add the forms' present state, at the time of `control`, and drop states without effect on the stress."""
         (C, step, _), variables = self._present(), self._stored
         states = [*variables.states, PastState(variables.states[-1].reduced_time + step, C)]
         smallest_h = variables.smallest_h

@@ -19,10 +19,7 @@ _LARGEST_TOOL = 20_000
 
 
 def frame_pictures(path: Any, frames: int) -> Callable[[], list[Any]]:
-    """Return a function that draws the whole part and its tools in each frame, as images, on rank 0; collective.
-
-    The frames are evenly spaced over the process. All have the same view and the same colours of the wall.
-    """
+    """Return a function that draws the whole part and tools in evenly spaced frames on rank 0; collective."""
     tooling, walls, travels, words = Tooling.of_problem(path.problem), [], [], []
     for a, b, fraction in spread(path, frames, sheet=False):
         state = between(path.record, a, b, fraction)

@@ -92,10 +92,7 @@ class LaggedApproach(Approach):
         self.face.set_closures(places)
 
     def has_too_many_closures(self, a: np.ndarray, b: np.ndarray) -> bool:
-        """Return True if a new point is deeper in the tool than twice its tributary length.
-
-        a, b: positions before and after the step, shape (n, 3), length.
-        """
+        """Return True if a new point is deeper than twice its tributary length; a, b: before and after, (n, 3)."""
         law, history = self.face.law, self.face.history
         deep = np.where(law.touching(a, history), 0.0, law.distance(b) - 2 * self.face.rule.lengths)
         return bool(combined(self._comm, float(deep.max(initial=0.0)), MPI.MAX) > 0)

@@ -44,10 +44,7 @@ class StudyRun:
 
 
 class Task(NamedTuple):
-    """Task of one process: a run by the user's function `build` for a set of values, and its measures.
-
-    measures: {name: function of the path, or name of a column}.
-    """
+    """Task of one process: the user's function `build`, and `measures`, {name: function of the path, or column}."""
 
     build: Callable[..., Any]
     measures: dict[str, Measure]

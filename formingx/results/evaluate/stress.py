@@ -298,10 +298,7 @@ class Stresses:
         return _cauchy(_shifted(self._patches.evaluate(cubics, points), -pressures[:, None]))
 
     def at_corners(self, fitted: Fitted) -> tuple[np.ndarray, np.ndarray]:
-        """Return the largest principal Cauchy stress at corners of cells, (m,), and the corners, (m, 2), length.
-
-        The stresses are those fitted in `fit`, for the m cells of this rank.
-        """
+        """Return the largest principal stress, of `fit`, at corners of cells of this rank, (m,), and these, (m, 2)."""
         owned = own_cells(self.problem.forms.domain)
         X = cell_node_positions(self.problem.forms.domain, owned)[:, :3]
         largest = np.linalg.eigvalsh(self._fitted_cauchy(fitted.cubics, fitted.pressures, X))[..., -1]

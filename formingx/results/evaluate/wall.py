@@ -152,10 +152,7 @@ def between_layers(mesh: Any, profile: Profile) -> tuple[list[str], np.ndarray]:
 
 
 def _interfaces(mesh: Any) -> dict[tuple[str, ...], np.ndarray]:
-    """Return the straight pieces of the interfaces between two named layers, equal on all ranks; collective.
-
-    The reference positions of both ends have shape (m, 2, 2), length.
-    """
+    """Return {layers: straight pieces of their interface (m, 2, 2), length} on all ranks; collective."""
     domain, topology = mesh.domain, mesh.domain.topology
     topology.create_connectivity(1, 2)
     layer = np.full(len(_compat.cell_nodes(domain)), -1)

@@ -261,10 +261,7 @@ class EnergyBalance:
         return lost
 
     def _heat(self, a: Any, b: Any) -> float:
-        """Return the energy that the change of temperature from state a to state b stores in the modelled body.
-
-        It is the mean of two changes at constant displacements, in the configurations of a and b.
-        """
+        """Return the energy of the change of temperature from a to b: the mean at the displacements of a and of b."""
         cold, warm = a.history_variables[-1], b.history_variables[-1]        # the temperature is last
 
         def stored(state: Any, temperature: Any) -> float:

@@ -271,10 +271,7 @@ def _read_history_variables(problem: Any, variables: list[dict[str, Any]]) -> li
 
 
 def _profile(path: Any, state: State) -> dict[str, np.ndarray] | None:
-    """Return the `Profile` of a state as {attribute: its value}, or None if the body is not a sheet.
-
-    Reports that are made from a checkpoint, without the `Scene`, draw it.
-    """
+    """Return the `Profile` of a state, for reports without the `Scene`, as {attribute: value}; no sheet: None."""
     try:
         profile = path.profile(state)
     except InputError:

@@ -14,10 +14,7 @@ from ...units import NONE, Units
 
 
 def write_path(path: Any, file: Any, units: Units = NONE) -> None:
-    """Write a CSV file with one row per state, all columns, stage, kind and iterations (`Path.to_csv`).
-
-    Units go into the header. Another ending is an InputError, a failed file an OSError.
-    """
+    """Write states as rows of a CSV file, with units in the header (`Path.to_csv`); a failed file is an OSError."""
     units = units.per_depth() if path.scene.kinematics.dimension_of_volume == 2 else units
     staged = any(s.stage for s in path.states)
     rows = [[*[s.stage] * staged, s.kind, max(len(s.history) - 1, 0), *(s.measures[c] for c in path.columns)]
@@ -27,10 +24,7 @@ def write_path(path: Any, file: Any, units: Units = NONE) -> None:
 
 
 def write_profile(profile: Any, file: Any, comm: Any) -> None:
-    """Write a CSV file with one row per bottom point of a sheet, its arc lengths, positions and thickness (`Profile`).
-
-    Rank 0 writes. Another ending is an InputError, a failed file an OSError.
-    """
+    """Write the bottom points of a `Profile` as rows of a CSV file on rank 0; a failed file is an OSError."""
     columns = ["reference_radius", "reference_length", "arc_length", "r_bottom", "z_bottom", "r_top", "z_top",
                "thickness", "thickness_ratio"]
     table = np.column_stack([profile.reference_radius, profile.reference_length, profile.arc_length, profile.bottom,
@@ -39,10 +33,7 @@ def write_profile(profile: Any, file: Any, comm: Any) -> None:
 
 
 def write_rows(file: Any, header: Sequence[str], rows: Iterable[Sequence[Any]], comm: Any) -> None:
-    """Write a CSV file with a header row; numbers are written with all their digits (rank 0 writes).
-
-    Another ending than .csv is an InputError, a failed file an OSError.
-    """
+    """Write a CSV file with a header row and all digits on rank 0; another ending than .csv is an InputError."""
     file = named("to_csv", file, ".csv")
 
     def write(stream):

@@ -183,10 +183,7 @@ def _save_gif(pictures: list[Any], seconds: float, stream: Any) -> None:
 
 
 def _save_mp4(pictures: list[Any], seconds: float, stream: Any) -> None:
-    """Write images as an MP4 with H.264, which every player reads; the last one is shown for one second more.
-
-    The stream is closed. A failure of ffmpeg raises an OSError.
-    """
+    """Write images as MP4 (H.264), the last for a second more, and close the stream; a failure is an OSError."""
     width, height = (2 * (n // 2) for n in pictures[0].size)              # H.264 wants even numbers
     rate = len(pictures) / seconds
     stream.close()                                           # ffmpeg writes the file by its name

@@ -142,10 +142,7 @@ def _tools(record: ReportData) -> list[dict[str, Any]]:
 
 
 def _loading(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any]]:
-    """Return plotly charts of loading curves: force of a tool over travel, or pressure over pole height.
-
-    A chart has one curve for each stage of each run. `names` has the name of each run, for the legend.
-    """
+    """Return plotly charts of loading curves, force over travel or pressure over pole height, by run and stage."""
     pairs: dict[tuple[str, str], list[dict]] = {}
     for record, name in zip(records, names):
         for a, b in record.stage_ranges:
@@ -180,10 +177,7 @@ def _driven(record: ReportData, stage: slice) -> list[tuple[str, str, np.ndarray
 
 
 def _in_time(records: list[ReportData], names: list[str], units: Units) -> list[dict[str, Any] | None]:
-    """Return plotly charts of pressures, travels, tool forces and temperatures of the body over the process time.
-
-    Runs without process time have no curves. `names` has the name of each run, for the legend.
-    """
+    """Return plotly charts of pressures, travels, tool forces and temperatures of runs over their process time."""
     drawn: dict[str, tuple[str, list]] = {}
     for record, name in zip(records, names):
         if not record.timed:
