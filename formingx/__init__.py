@@ -15,6 +15,7 @@ import sys as _sys
 from . import _solver_wheel  # isort: skip  # loads MPI, before any other module
 from . import _calls, _interrupts, exact, mesh, tools
 from ._extensions import add as _add
+from ._extensions import list_public as _list_public
 from ._extensions import optional as _optional
 from .checks.check import check
 from .errors import ConvergenceError, InputError, Interrupted
@@ -122,4 +123,5 @@ __version__ = "0.1.0"
 
 for _module in (mesh, tools, _sys.modules[__name__]):
     _calls.explain(_module)
+    _list_public(_module, exact, mesh, tools)
 _interrupts.importing.restore()

@@ -25,6 +25,14 @@ def test_closed_forms_are_reached_by_their_names():
         fx.exact.inflations  # noqa: B018
 
 
+def test_completion_lists_what_users_meet():
+    """No folders of the package, and nothing that its files import."""
+    listed = {name for module in (fx, fx.mesh, fx.tools) for name in dir(module) if not name.startswith("__")}
+    assert {"Scene", "trace", "disc", "tube", "cup", "solid", "mesh", "tools", "exact"} <= listed
+    assert not {"MPI", "forms", "problem", "build", "shapes", "optional"} & listed
+    assert not any(name.startswith("_") for name in listed)
+
+
 def test_importing_loads_no_optional_modules():
     code = "import sys, formingx; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split()
