@@ -31,10 +31,7 @@ class FaceHistory(NamedTuple):
     penalty: np.ndarray
 
     def saved(self, points: np.ndarray, comm: Any) -> dict[str, np.ndarray]:
-        """Return {name: array} of the history variables and points of all ranks; collective.
-
-        points: reference positions of the n owned points, shape (n, components), length.
-        """
+        """Return {name: array} of history variables and points (n, components), length, of all ranks; collective."""
         parts = comm.allgather((points, *self.history, self.newly_closed, self.penalty))
         names = ("points", *self.history._fields, "newly_closed", "penalty")
         return {name: np.concatenate(column) for name, column in zip(names, zip(*parts, strict=True))}
@@ -64,14 +61,8 @@ class Increment:
     * If statuses change, the local contact problem (`LocalSolve`) reads `newly_closed` and `last`, predicts tractions
       by `after`, and sets the sense of sliding of the next iteration by `expect`.
 
-    Args:
-        law: contact law.
-        history: history variables of the points; None without friction.
-        start: positions of the points relative to the tool at the last accepted state, shape (n, c), length; None
-            without such a state.
-        guessed: mask of the points whose predicted contact forces belong to the guess of the step, shape (n,). The
-            first iteration linearises the law at the guess for these points. For the others it extrapolates distances
-            and slips from `start`.
+    `start` are the positions at the last accepted state, shape (n, c), length. The first iteration linearises the law
+    at the guess for the points `guessed`, mask of shape (n,), and extrapolates from `start` for the others.
 
     Attributes:
         last: `Tractions` that were computed last, with the `ContactStatus` of each point and, after `linearise`, the
@@ -124,10 +115,7 @@ class Increment:
         return self._law.touching(self._last_x, self._history) & ~self._touched
 
     def after(self, motion: np.ndarray) -> Tractions:
-        """Return the law linearised after a further motion y of the points, shape (n, c), length.
-
-        Its traction f and stiffness S are those before the motion; after it the traction is f + S y.
-        """
+        """Return the law linearised after a motion y (n, c), length: the traction f + S y, with the stiffness S."""
         assert self._before is not None
         return self._law.tractions(self._last_x, self._history, None, self._before.to(self._last_x + motion))
 
@@ -156,12 +144,8 @@ class FaceContact:
     """Residual, tangent and history variables of one contact, at the n locally owned points of its face.
 
     Positions are relative to the tool: position of the point minus travel of the tool. A state is given by `fields`,
-    the locally owned unknowns, and by `control`.
-
-    Args:
-        solid: the scene's formulation, such as `Solid`.
-        contact: the `Contact`.
-        assemble: function that assembles a compiled linear form and returns its locally owned entries.
+    the locally owned unknowns, and by `control`. `assemble` assembles a compiled linear form and returns its owned
+    entries.
 
     Attributes:
         rule: quadrature rule, with the contact points (`Rule`).
@@ -213,10 +197,7 @@ class FaceContact:
         self._base, self._rate, self.active, self.moves = base, rate, active, bool(rate)
 
     def shift_distances(self, shift: np.ndarray) -> None:
-        """Reduce the distances from the tool by `shift`, shape (n,), length.
-
-        A remeshed body thus keeps its pressures.
-        """
+        """Reduce distances from the tool by `shift`, (n,), length: a remeshed body thus keeps its pressures."""
         self.shift = shift
         self.law = self._law(self._penalty)
 
@@ -239,10 +220,7 @@ class FaceContact:
         return (self._base + self._rate * control) * self._travel_vector
 
     def relative_motion(self, dx: np.ndarray, step: np.ndarray | float) -> np.ndarray:
-        """Return the motion relative to the tool by dx, shape (m,) or (m, k), and step.
-
-        The shape is (n, components) or (n, components, k), in length.
-        """
+        """Return the motion relative to the tool, (n, components[, k]), length, by dx, (m[, k]), and a step."""
         motion = self._length * self.displacement(dx)
         return motion - np.multiply.outer(self._travel_vector, self._rate * step) if self._rate else motion
 

@@ -100,11 +100,6 @@ class Lobatto(_NodalPoints):
 
     The integral over a straight facet is exact if the integrand, with the weight 2 pi R of the area, is cubic. A node
     on the axis has the tributary area 0 (`lumped`).
-
-    Args:
-        solid: formulation of the body.
-        on: name of the boundary.
-        assemble: function that assembles a compiled linear form and returns its locally owned entries.
     """
 
     def __init__(self, solid: Any, on: str, assemble: Any):
@@ -186,10 +181,6 @@ class Vertices(_NodalPoints):
     """Contact points of a sheet in three dimensions: its nodes, each with a third of the area of adjacent triangles.
 
     The tributary length of a node is the square root of this area.
-
-    Args:
-        surface: formulation of the sheet.
-        assemble: function that assembles a compiled linear form and returns its locally owned entries.
     """
 
     def __init__(self, surface: Any, assemble: Any):
@@ -214,14 +205,9 @@ class Vertices(_NodalPoints):
 
 
 class Gauss:
-    """Gauss rule: several contact points on each facet of a face whose adjacent cell this rank owns.
+    """Gauss rule: `count` contact points on each facet of a face whose adjacent cell this rank owns.
 
     Nodes of such a facet may be ghosts.
-
-    Args:
-        solid: formulation of the body.
-        on: name of the boundary.
-        count: number of points on each facet.
 
     Attributes:
         shapes: shape functions of the three nodes of the facet at the points, shape (n, 3).
@@ -282,10 +268,7 @@ class Gauss:
         return grown * weight(now.T) / weight(self.points.T)
 
     def _at_nodes(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the three nodes on the facet of each point, shape (n, 3, components).
-
-        values: locally owned unknowns.
-        """
+        """Return displacements (n, 3, components) at the nodes of each point's facet from owned unknowns."""
         unknowns, n = self._unknowns, self._owned
         unknowns.array[:n] = values[:n]
         unknowns.scatter_forward()
@@ -298,10 +281,7 @@ class Gauss:
 
 
 def _along(edges: np.ndarray) -> np.ndarray:
-    """Return dx/ds at the first end, the second end and the middle of edges, shape (m, 3, components).
-
-    edges: positions of these three nodes of m edges, same shape, length. s increases from 0 to 1 along an edge.
-    """
+    """Return dx/ds at both ends and the middle of edges (m, 3, components), length; s goes from 0 to 1 along each."""
     a, b, m = edges.transpose(1, 0, 2)
     return np.stack([4 * m - 3 * a - b, a - 4 * m + 3 * b, b - a], axis=1)
 
@@ -318,10 +298,7 @@ def _displacements(solid: Any) -> tuple[Any, np.ndarray]:
 
 
 def _nodes_of(facets: np.ndarray, vectors: Any, X: np.ndarray) -> np.ndarray:
-    """Return the local numbers of both ends and the middle node of each facet, shape (facets, 3).
-
-    X: reference positions of the nodes, shape (nodes, components), length.
-    """
+    """Return local numbers (facets, 3) of ends and middle of facets; X: reference positions (nodes, components)."""
     found = [ends_first(fem.locate_dofs_topological(vectors, 1, np.array([f], dtype=np.int32), remote=False), X)
              for f in facets]
     return np.array(found, dtype=np.int32).reshape(-1, 3)

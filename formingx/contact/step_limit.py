@@ -67,10 +67,6 @@ class Approach:
 
     `StepLimit` calls `step_length`, `closures` and `prepare` before the solve of a step, the other methods after it.
 
-    Args:
-        face: the contact.
-        conducts: True if heat flows through points in contact, from the end of the step on.
-
     Attributes:
         points: number of points of the face on all ranks.
         max_closures: number of points that may come into contact in one step along the tangent. It is ten times larger
@@ -333,9 +329,6 @@ class StepLimit:
 
     The run calls `length` (largest admissible arc length), then `prepare` (before the solve), then `check` (accept the
     solved step or shorten it).
-
-    Args:
-        problem: the `Problem`.
 
     Attributes:
         active_contacts: the `Approach` of each contact that is active in the current stage.

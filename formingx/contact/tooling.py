@@ -59,10 +59,7 @@ class Tooling(NamedTuple):
         return {name: f"{c.name or name.replace(' ', '_')}_force" for name, c in zip(names, self.contacts)}
 
     def travels(self, setting: dict[str, Any], control: float) -> list[float | None]:
-        """Return the travel of each tool along its direction, length; None for an inactive tool.
-
-        setting: `StepData` as plain data; empty for the reference configuration.
-        """
+        """Return the travel of each tool, length, by plain `StepData` or {}; None for an inactive tool."""
         if not setting:
             return [0.0] * len(self.contacts)
         step_data = StepData(**setting)
@@ -84,10 +81,7 @@ def register_tools(make: Callable[[dict[str, Any]], Any]) -> None:
 
 
 def tool_of(shape: dict[str, Any]) -> Any:
-    """Return the tool that plain data describe; in a section they have the entries "pieces" and "closed".
-
-    Raise `InputError` for a tool in three dimensions without `formingx.extensions.space`.
-    """
+    """Return the tool that plain data describe; one in three dimensions without the extension is an InputError."""
     if "pieces" in shape:
         pieces: list[Line | Arc] = []
         for piece in shape["pieces"]:

@@ -43,10 +43,6 @@ class Curve:
     with the weight w of the control. The first term is the mean over the body of the squared displacement, made
     dimensionless by the size of the body (`Equations.inner`).
 
-    Args:
-        problem: the equations.
-        tolerances: convergence criteria of a state.
-
     Attributes:
         problem: the equations.
         newton: solver of F = 0 with a constraint (`BorderedNewton`).
@@ -120,10 +116,7 @@ class Curve:
         return bool(forces > np.finfo(float).eps * np.sqrt(stiffness))
 
     def resume(self, x: Array, control: float) -> State:
-        """Return a known solution, x of shape (n,), as the first state of a path under the current step data.
-
-        Raise `Failure` if its tangent is singular.
-        """
+        """Return a solution x (n,) as first state under the step data; a singular tangent is a `Failure`."""
         self._x.array_w[:] = x
         self.problem.residual(self._x, control, self.newton.F)
         flat = self._has_no_stiffness()
@@ -190,10 +183,7 @@ class Curve:
             self._one_sided_state = state, self.newton.solver.count
 
     def factorise_one_sided(self, state: State) -> bool:
-        """Factorise dF/dx for a step from an accepted state, on the side of the step, unless it was factorised last.
-
-        Return False if the matrix is singular.
-        """
+        """Factorise dF/dx on the side of the step, unless it was so last; return False if it is singular."""
         if self._one_sided_state != (state, self.newton.solver.count):
             self._x.array_w[:] = state.x
             if not self.newton.tangent(self._x, state.control, one_sided=True):
@@ -304,10 +294,7 @@ class Curve:
         return slope**2 * self.control_weight > 0.5
 
     def interpolate(self, a: State, b: State, fraction: float) -> tuple[Array, float]:
-        """Return (x, control) on the Hermite cubic through two states, at 0 in `a` and at 1 in `b`.
-
-        x: locally owned entries, shape (n,).
-        """
+        """Return (x (n,), control) on the Hermite cubic through two states, at 0 in `a` and at 1 in `b`."""
         s, h = fraction, self.distance(a, b)
         weights = (1 - 3 * s**2 + 2 * s**3, 3 * s**2 - 2 * s**3, h * (s - 2 * s**2 + s**3), h * (s**3 - s**2))
         x = weights[0] * a.x + weights[1] * b.x + weights[2] * a.direction + weights[3] * b.direction

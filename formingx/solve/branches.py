@@ -28,13 +28,9 @@ class OrientationCheck:
 
     `State.orientation` is constant along a smooth path, through limit points, too. It differs at both ends of a step
     over two limit points that are close together, which ends on a piece of path that comes back, and of a step over a
-    branch point. So a step with different orientations is halved. If the shorter step ends on the cubic through both
-    ends of the longer one with their tangents, the path is smooth between them: another path branches off, and the
-    longer step is accepted.
-
-    Args:
-        curve: solver of the path.
-        shortest: arc length below which no shorter step is tried.
+    branch point. So a step with different orientations is halved, down to the arc length `shortest`. If the shorter
+    step ends on the cubic through both ends of the longer one with their tangents, the path is smooth between them:
+    another path branches off, and the longer step is accepted.
 
     Attributes:
         max_distance: distance of a state from the cubic, over the distance of its ends, up to which the path is smooth.

@@ -54,11 +54,8 @@ def configure(ksp: PETSc.KSP, matrix: PETSc.Mat, symmetric: bool) -> None:
 class DirectSolver:
     """Direct solver by MUMPS: factorise a matrix once, then solve for many right-hand sides.
 
-    Args:
-        matrix: the matrix; `factorise` uses its current entries.
-        symmetric: True for LDL^T factors, False for LU factors.
-        determinant: compute the determinant with each factorisation (`sign`).
-        inertia: count the negative pivots with each factorisation (`negative_pivots`).
+    symmetric: True for LDL^T factors, False for LU factors. Each factorisation computes the determinant (`sign`) and
+    the number of negative pivots (`inertia`, `negative_pivots`) if wanted.
 
     Attributes:
         count: number of factorisations so far.

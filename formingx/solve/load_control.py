@@ -21,10 +21,6 @@ class FixedControl:
 
     A backtracking line search would stall for thin sheets.
 
-    Args:
-        problem: the equations.
-        tolerances: convergence criteria.
-
     Attributes:
         history: the iterations of the last solution.
     """
@@ -69,10 +65,7 @@ class FixedControl:
         self._problem.tangent(x, self._control)
 
     def _test(self, snes: PETSc.SNES, iteration: int, norms: tuple[float, float, float]) -> int:
-        """Append the iteration to `history`; return the reason (`PETSc.SNES.ConvergedReason`) to stop or to iterate.
-
-        norms: norms of x, of its last correction and of the residual.
-        """
+        """Append the iteration, with norms of x, its correction and F, to `history`; return PETSc's reason."""
         size, step, residual = norms
         left = relative(self._problem, residual)
         correction = step / (size + 1e-8) if iteration else 1.0

@@ -58,10 +58,7 @@ class BorderedTangent:
     slope: float
 
     def __call__(self, V: Array) -> Array:
-        """Map solutions K^-1 E, owned rows, shape (n, m), to the bordered system in place.
-
-        Return the changes of the control, shape (m,).
-        """
+        """Map K^-1 E, owned rows (n, m), to the bordered system in place; return changes of the control (m,)."""
         steps: Array = -combined(self.b.comm.tompi4py(), self.gradient.array_r @ V) / self.slope
         V += np.outer(self.b.array_r, steps)
         return steps
@@ -70,13 +67,8 @@ class BorderedTangent:
 class BorderedColumns:
     """Solutions of the bordered system for m right-hand sides, such as unit forces at contact points.
 
-    The bordered system is K dx = E for the tangent K, with the constraint of the step as a further row.
-
-    Args:
-        solver: solver with the factors of the tangent K.
-        E: right-hand sides as columns, locally owned rows, shape (n, m).
-        border: function that maps solutions K^-1 E, shape (n, m), to the bordered system in place. It returns the
-            changes of the control, shape (m,).
+    The bordered system is K dx = E, E of shape (n, m), for the factorised tangent K, with the constraint of the step as
+    a further row. `border` maps K^-1 E to it in place, and returns the changes of the control, shape (m,).
 
     Attributes:
         steps: change of the control for each right-hand side, shape (m,).
@@ -100,20 +92,12 @@ class BorderedColumns:
 
 
 class CondensedColumns:
-    """Solutions of the bordered system for m right-hand sides that are zero in most rows.
+    """Solutions of the bordered system (`BorderedColumns`) for m right-hand sides that are zero in most rows.
 
-    The bordered system is K dx = E for the tangent K, with the constraint of the step as a further row.
-
-    Only the entries of K^-1 in the nonzero rows of the right-hand sides are computed. They give the solutions in these
-    rows, and so the motions of contact points that depend on no other unknowns. One solution with the transposed K
-    gives the changes of the control for all right-hand sides. Each update of all unknowns takes one solution with K.
-
-    Args:
-        solver: solver with the factors of the tangent K.
-        E: right-hand sides as columns, shape (n, m).
-        border: border of the system, from the constraint of the step.
-        inverse: entries of K^-1 in `rows` and in the columns of the same numbers, shape (k, k).
-        rows: numbers of the rows in which a right-hand side is not zero, shape (k,).
+    Only the entries of K^-1 in the nonzero `rows`, shape (k,), of the right-hand sides are computed: `inverse`, shape
+    (k, k). They give the solutions in these rows, and so the motions of contact points that depend on no other
+    unknowns. One solution with the transposed K gives the changes of the control for all right-hand sides. Each update
+    of all unknowns takes one solution with K.
 
     Attributes:
         steps: change of the control for each right-hand side, shape (m,).
@@ -202,9 +186,6 @@ LOCAL = LocalContact()
 class LocalSolve:
     """Local solve for the contact points whose gap closed, or whose status changed, in one run of Newton's method.
 
-    Args:
-        problem: the equations.
-
     Attributes:
         failed: number of local solves without a solution that satisfies the contact law.
     """
@@ -216,10 +197,7 @@ class LocalSolve:
         self.failed = 0
 
     def mark_changes(self) -> None:
-        """Mark the points whose gap closed, or whose status changed since the last call.
-
-        It is called once after each linearisation.
-        """
+        """Mark points whose gap closed or status changed since the last call, once after each linearisation."""
         now = [contact.increment.last.status for contact in self._contacts]
         self._marked = self._marked or [contact.increment.newly_closed for contact in self._contacts]
         for mark, a, b in zip(self._marked, self._status, now):
@@ -290,9 +268,6 @@ class FacePoints:
     m is the number of these points. n is the number of all points of the faces that this rank owns, one face after the
     other.
 
-    Args:
-        faces: the `FaceContact` objects.
-
     Attributes:
         ids: (rank, number among the n points of this rank) of each of the m points.
         starts: number of the first of the n points of each face, and n, shape (faces + 1,).
@@ -337,15 +312,9 @@ class FacePoints:
 class _Points(FacePoints):
     """A few contact points of all ranks, with the compliance of the body at these points.
 
-    There are m points with c components on all ranks. An array of the shape (m c,) has the components of the points one
-    after the other, in the order of ranks, faces and points.
-
-    Args:
-        problem: the equations.
-        chosen: for each face, local numbers of owned points.
-        solver: solver with the LU factors of the tangent K.
-        border: function that maps solutions K^-1 E, shape (n, m), to the bordered system in place. It returns the
-            changes of the control, shape (m,).
+    There are m points with c components. An array of the shape (m c,) has the components of the points one after the
+    other, in the order of ranks, faces and points. chosen: for each face, local numbers of owned points. border: see
+    `BorderedColumns`.
     """
 
     def __init__(self, problem: Equations, chosen: list[Array], solver: DirectSolver, border: Border):

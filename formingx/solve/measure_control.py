@@ -51,17 +51,11 @@ _STEPS = QuantitySteps()
 
 
 class QuantityRun(Run):
-    """Run in which an output quantity follows a prescribed amplitude in time, and the control is an unknown.
+    """Run in which an output quantity follows an `amplitude` in time, in the user's units; the control is an unknown.
 
-    Args:
-        record: record of the states.
-        quantity: the prescribed output quantity.
-        amplitude: function of time that returns the prescribed value of the quantity, in the user's units.
-        times: times that are met exactly: the start, the corners and the end of the amplitude.
-        targets: pairs (target, output quantity) to meet on the way.
-        step: step control, whose lengths are fractions of the duration of the run; None: the default of `Run`.
-        accuracy: tolerance of the relative time integration error.
-        label: text before the target beside a progress bar.
+    times: met exactly, the start, the corners and the end of the amplitude. targets: pairs (target, output quantity) to
+    meet on the way. step: its lengths are fractions of the duration. accuracy: tolerance of the relative time
+    integration error.
     """
 
     def __init__(self, record: Record, quantity: Quantity, amplitude: Callable[[float], float], times: Sequence[float],

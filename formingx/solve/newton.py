@@ -56,15 +56,12 @@ class Newton:
 class ActiveSetChanges:
     """Changes of the active set of contact during one run of Newton's method.
 
-    Args:
-        problem: the equations.
-        small: size below which a correction counts as small (`Newton.small_correction`).
-
     Attributes:
         changed: number of the iteration in which the active set changed last, counted from 0.
         share: factor of the next correction, halved (to 1/4 at least) when an earlier active set returns, as full
             corrections would cycle.
-        found: number of small corrections that led to a new active set, for `Newton.exempt_iterations`.
+        found: number of small corrections (`Newton.small_correction`) that led to a new active set, for
+            `Newton.exempt_iterations`.
         returns: number of returns to an earlier active set.
     """
 
@@ -75,10 +72,7 @@ class ActiveSetChanges:
         self.changed, self.share, self.found, self.returns = 0, 1.0, 0, 0
 
     def compare(self, moved: float) -> None:
-        """Compare the active set with earlier ones, once after each residual.
-
-        moved: size of the last correction, which decides whether a new active set counts in `found`.
-        """
+        """Compare the active set with earlier ones, once after each residual; moved: size of the last correction."""
         self._iteration += 1
         now = self._problem.contact.status
         if now != self._last and self._last is not None:
@@ -103,9 +97,6 @@ class ModifiedNewton:
     The first iteration of a step may use the tangent matrix of an earlier state. Let q_0 be its q in the last step that
     began so. The expected q is q_0, halved for each step since then. Earlier matrices are thus tried again after some
     steps.
-
-    Args:
-        settings: settings of Newton's method.
 
     Attributes:
         setting: step data of the last factorised tangent, which later iterations may keep; None if it is singular.
@@ -165,13 +156,9 @@ def tangents(history: list[Iteration]) -> int:
 class Failure(Exception):
     """Failure of Newton's method, or of a step.
 
-    Args:
-        reason: the reason, as text.
-        history: residual and correction of each Newton iteration before the failure (`Iteration`); may be empty.
-
     Attributes:
         reason: the reason, as text.
-        history: the argument `history`.
+        history: residual and correction of each Newton iteration before the failure (`Iteration`); may be empty.
         attempt: unknowns and last corrections at the end of the iteration; None if no iteration failed.
     """
 
@@ -261,13 +248,9 @@ class Drag(Protocol):
 class BorderedNewton:
     """Newton's method for F(x, control) = 0 together with a constraint c(x, control) = 0.
 
-    Args:
-        problem: the equations.
-        tolerances: convergence criteria.
-        norm: function (change of x, change of the control) that returns the size of a correction, dimensionless.
-        settings: settings of Newton's method.
-        drag: forces that are added to F, such as viscous forces, or None. With them the control must be constant: the
-            constraint must be `fixed`.
+    norm: function (change of x, change of the control) that returns the size of a correction, dimensionless. drag:
+    forces added to F, such as viscous forces, or None. With them the control must be constant: the constraint must be
+    `fixed`.
 
     Attributes:
         solver: direct solver with the factors of the last tangent dF/dx.
@@ -291,10 +274,7 @@ class BorderedNewton:
         self._modified = ModifiedNewton(self.settings)
 
     def tangent(self, x: PETSc.Vec, control: float, one_sided: bool = False) -> bool:
-        """Factorise dF/dx at a solution, store dx/dcontrol in `b`, and return False if dF/dx is singular.
-
-        one_sided: True to take derivatives at a kink of F on the side of the next step.
-        """
+        """Factorise dF/dx at a solution (one-sided: for the next step), store `b`; return False if it is singular."""
         if not self._factorise(x, control, one_sided):
             return False
         self.solver.solve(self.F_control, self.b)
@@ -454,10 +434,7 @@ class BorderedNewton:
 
 
 def fixed(target: float) -> Constraint:
-    """Return the constraint c = control - target as a function (x, control, gradient): it returns (c, dc/dcontrol).
-
-    It sets `gradient` to dc/dx, zeros.
-    """
+    """Return the constraint control - target of (x, control, gradient): (c, dc/dcontrol), with dc/dx zeros set."""
     def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
         gradient.set(0)
         return control - target, 1.0

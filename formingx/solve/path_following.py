@@ -51,15 +51,9 @@ class PathFollowing:
 class Run:
     """Run along a path with one control, from state to state, until its last target is met.
 
-    Args:
-        record: record of the states, with the solver of the path.
-        targets: pairs (target, output quantity). The last target ends the run; the others are met on the way.
-        step: step control; None: the step control stored with the last state of the record, or `StepControl()`.
-        at_limit_point: rule at limit points of the control, "continue", "snap_through" or "stop"; None: the default of
-            `at_limit_points`.
-        accuracy: tolerance of the relative time integration error.
-        label: text before the target beside a progress bar.
-        requested: another target that ends the run, or None.
+    targets: pairs (target, output quantity); the last ends the run, the others are met on the way; `requested` may end
+    it, too. step: None for that of the last state, or the default. at_limit_point: "continue", "snap_through", "stop",
+    or None for the default (`at_limit_points`). accuracy: tolerance of the relative time integration error.
     """
 
     settings = PathFollowing()
@@ -290,10 +284,7 @@ class Run:
 
     @property
     def _predictor(self) -> Predictor | None:
-        """Function that returns a guess of x at a control, from the polynomial in time through the last states.
-
-        None unless time passes with the control.
-        """
+        """Function from a control to a guess of x, a polynomial through the last states; None if no time passes."""
         if not self.problem.setting.rate[-1]:
             return None
 

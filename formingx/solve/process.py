@@ -48,12 +48,10 @@ class Execution:
     Args:
         record: record of the states.
         plans: plans of the stages.
-        unchecked: plans whose tools must be checked again at the start of their stage, since travels are unknown
-            before.
-        check: function that checks such a plan. Its arguments are the plan and a function from the number of an item to
-            its value in the user's units.
+        unchecked: plans for `check` to check again at the start of their stage, since travels are unknown before.
+        check: function of such a plan, and of a function from the number of an item to its value in the user's units.
         step: step control of stages without their own; None: the default.
-        balanced: norm of the unbalanced forces, relative to the support forces, below which they are negligible.
+        balanced: norm of negligible unbalanced forces, relative to the support forces.
         accuracy: tolerance of the relative time integration error.
     """
 
@@ -119,10 +117,7 @@ class Execution:
         return found
 
     def _open_targets(self) -> _Targets:
-        """Return the pairs (target, output quantity) of the stage that are still to be met.
-
-        Those that it met before a remeshing are left out.
-        """
+        """Return the open pairs (target, output quantity) of the stage, not those met before a remeshing."""
         met = [s.target[:2] for segment in self.record.segments[:-1] for s in segment.states
                if s.target and s.setting["stage"] == self._k]
         return [(target, quantity) for target, quantity in self._targets[self._k]
@@ -204,10 +199,7 @@ class Execution:
             self._enter(self._amplitudes(), still, 0, control)
 
     def _out_of_balance(self, x: Array) -> bool:
-        """Return True if the unbalanced forces at the unknowns x are not negligible against the support forces.
-
-        x: locally owned entries, shape (n,).
-        """
+        """Return True if unbalanced forces at x, owned (n,), are not negligible against the support forces."""
         self.problem.x.array_w[:] = x
         self.problem.residual(self.problem.x, 1.0, self.curve.newton.F)
         return relative(self.problem, self.curve.newton.F.norm()) > self._balanced

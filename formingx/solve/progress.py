@@ -22,14 +22,9 @@ log = logging.getLogger("formingx")
 class RunTargets:
     """Open targets of a run, and the progress of the run to its last target.
 
-    Args:
-        curve: solver of the path.
-        targets: pairs (target, output quantity). The last target ends the run.
-        requested: another target that ends the run, or None.
-
     Attributes:
         open: pairs (target, output quantity) of the targets that are still to be met.
-        until: the last target.
+        until: the last target, which ends the run, as `requested` does, if given.
         quantity: output quantity of the last target.
         is_control: True if the last target is a value of the control, or of an amplitude that depends on the control.
         values: values of this quantity in the states of the run so far, in the user's units.
@@ -150,14 +145,9 @@ class RunTargets:
 
 
 class Progress:
-    """Display of the progress of a run, on rank 0: a bar after two seconds, and log lines at intervals.
+    """Display of the progress of a run on rank 0: a bar after two seconds, in a terminal or notebook, and log lines.
 
-    Without a terminal or a notebook there are log lines alone.
-
-    Args:
-        comm: MPI communicator of the run.
-        words: text before the progress.
-        shown: True for a bar and for log lines of the level WARNING; False for no bar and lines of the level INFO.
+    Log lines have the level WARNING, or INFO without a bar if not `shown`.
 
     Attributes:
         silence: processor time of this thread between two log lines, s.

@@ -81,10 +81,6 @@ class RunHooks:
 class Record:
     """Record of a run: its accepted states, in order.
 
-    Args:
-        problem: the first problem of the run.
-        curve: solver of this problem.
-
     Attributes:
         segments: list of `Segment`; accepted states are added to the last one.
         counts: cost of the run (`Counts`).

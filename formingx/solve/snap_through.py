@@ -92,10 +92,7 @@ class SnapThrough:
     equilibrium_force: float = 1e-10
 
     def lengths_for(self, limit: StepLimit | None) -> tuple[float, ...]:
-        """Return the arc lengths of steps at which a snap-through is tried after two failures.
-
-        If all contacts with friction stick, it is the smallest alone.
-        """
+        """Return arc lengths for a snap-through after two failures, the smallest alone if all friction sticks."""
         return self.lengths[-1:] if limit and limit.only_sticks else self.lengths
 
     def retry_fraction(self, iterations: int) -> float:
@@ -108,12 +105,7 @@ class NoEquilibrium(Failure):
 
 
 class ViscousDrag:
-    """Viscous forces eta V (x - origin) on the body, with the matrix V of a viscous stress.
-
-    At constrained unknowns the forces are 0.
-
-    Args:
-        viscosity: the viscosity of the problem, with the matrix V.
+    """Viscous forces eta V (x - origin) on the body, 0 at constrained unknowns, with the matrix V of a viscous stress.
 
     Attributes:
         eta: viscosity over the shear modulus, dimensionless.
@@ -139,15 +131,10 @@ class ViscousDrag:
 
 
 class _Motion:
-    """Viscous motion from an unstable state to the next equilibrium.
+    """Viscous motion, at a constant control, from the unstable state `old` to the next equilibrium.
 
-    Args:
-        curve: solver of the path.
-        old: the state from which the body moves.
-        control: control during the motion, which is constant.
-        settings: settings of the motion (`SnapThrough`).
-        work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either.
-        passed: earlier states of the path, to which the body must not return.
+    work_sign: 1 or -1, the sign that the work of the controlled load must have; 0: either. passed: earlier states of
+    the path, to which the body must not return.
 
     Attributes:
         state: current position of the body, as a state.
@@ -323,15 +310,9 @@ def was_passed(curve: Curve, passed: Sequence[State], old: State, new: State) ->
 class JumpRules:
     """Snap-throughs of a run: where they are tried, and with which change of the control.
 
-    Args:
-        curve: solver of the path.
-        targets: targets of the run.
-        settings: settings of snap-through.
-        rule: rule at limit points: "continue", "continue_volume" (snap where the enclosed volume has a maximum),
-            "snap_through" or "stop"; "" until it is known.
-
     Attributes:
-        rule: the argument `rule`; a run sets it at its start.
+        rule: rule at limit points: "continue", "continue_volume" (snap where the enclosed volume has a maximum),
+            "snap_through" or "stop"; "" until a run sets it at its start.
         change: change of the control in the next snap-through, dimensionless. It is 10 times larger after each
             snap-through, and returns to its first value after a step along the path.
         no_equilibrium_at: control at which a snap-through reached no equilibrium, dimensionless; NaN without one.

@@ -95,12 +95,9 @@ def allowed(caller: str, accuracy: str | float) -> float:
 class TimeError:
     """Estimator of the time integration error of a step, relative to its tolerance.
 
-    Args:
-        problem: the equations.
-        accuracy: allowed relative error of stress and thickness in the run.
-        once: tolerance of the error at the end of a step, as a multiple of `accuracy`.
-        adding_up: tolerance of the part of the error that persists, as a multiple of `accuracy` to the power 3/2. It
-            decreases faster with `accuracy`, since this part adds up over more steps.
+    accuracy: allowed relative error of stress and thickness in the run. once: tolerance of the error at the end of a
+    step, over `accuracy`. adding_up: tolerance of the part that persists, over `accuracy` to the power 3/2. It
+    decreases faster, since this part adds up over more steps.
     """
 
     def __init__(self, problem: Equations, accuracy: float, once: float = 0.5, adding_up: float = 0.5):
@@ -120,14 +117,11 @@ class TimeError:
 
 
 class Cutback(Exception):
-    """Exception for a step that is too long: the step is repeated with a smaller length.
+    """Exception for a step that is too long: the step is repeated with `part` of its length.
 
-    Args:
-        why: the reason, as text.
-        part: admissible length of the step, over its length.
-        lasts: True if later steps must be shorter, too.
-        control: control at which the repeated step ends; None: it ends at its arc length. A step in time needs the
-            control if the body moves at once when the step begins: the arc length then says little about the time.
+    lasts: True if later steps must be shorter, too. control: control at which the repeated step ends; None: it ends at
+    its arc length. A step in time needs the control if the body moves at once when the step begins: the arc length then
+    says little about the time.
     """
 
     def __init__(self, why: str, part: float, lasts: bool = False, control: float | None = None):

@@ -128,15 +128,11 @@ _SETTINGS = EventSettings()
 
 
 class ContactEventSequence:
-    """Gap closures after an accepted state, in order, and the piecewise-linear path through them.
+    """Gap closures after an accepted state (x, control), in order, and the piecewise-linear path through them.
 
-    Args:
-        faces: the active `FaceContact` objects.
-        n: number of locally owned unknowns of the fields, the first entries of x.
-        x, control: unknowns (locally owned entries) and control of the accepted state.
-        direction, slope: derivatives of x and of the control with respect to arc length.
-        response: `BodyResponse`, which solves for the motion of the body under contact forces by the stored LU factors.
-        batch: number of points of a face whose compliance is computed at a time.
+    direction, slope: d/ds of x, owned entries, of which the first n are fields, and of the control. response: solver
+    for the motion under contact forces by the stored LU factors. batch: points of a face whose compliance is computed
+    at a time.
 
     Attributes:
         touching: number of closed points of each face at the state, on all ranks.

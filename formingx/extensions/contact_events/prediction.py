@@ -68,12 +68,8 @@ class ContactEventPredictor:
 class ContactEventPrediction:
     """Predicted contact events after an accepted state, for steps of different lengths.
 
-    Args:
-        contacts: active contacts.
-        allowed: number of points of each contact whose gaps may close in one step.
-        n: number of locally owned unknowns of the fields, the first entries of x.
-        state: the accepted state.
-        response: linearised response of the body to contact forces at this state.
+    allowed: number of points of each contact whose gaps may close in one step. n: number of locally owned unknowns of
+    the fields, the first entries of x.
     """
 
     def __init__(self, contacts: list[Approach], allowed: list[int], n: int, state: Any, response: BodyResponse):

@@ -44,14 +44,8 @@ class BodyResponse:
               V = K^{-1} E
 
     K is the tangent dF/dx, :math:`\lambda` the control, and a dot the derivative along the path by arc length. n is the
-    normal of the plane in which an arc-length step ends (`Curve.plane_normal`). The methods return None once the stored
-    LU factors belong to another tangent.
-
-    Args:
-        curve: path solver (`formingx.solve.arc_length.Curve`) that has just factorised the tangent at the state.
-        state: the accepted state.
-        x: work vector for the unknowns.
-        F: work vector for the residual.
+    normal of the plane in which an arc-length step ends (`Curve.plane_normal`). The curve has just factorised K at the
+    state; the methods return None once its LU factors belong to another tangent. x and F are work vectors.
 
     Attributes:
         problem: the problem, with all members of its class.
@@ -139,13 +133,8 @@ class CondensedPoints(FacePoints):
     """Contact points of all ranks whose compliance is known: the motion of the body under unit forces at these points.
 
     Each unit force contributes -1 to one component (r or z) of the residual F at one point. m is the number of these
-    points, n the number of all contact points that this rank owns.
-
-    Args:
-        faces: the active `FaceContact` objects.
-        n: number of locally owned unknowns of the fields, the first entries of x.
-        size: number of locally owned entries of x.
-        response: `BodyResponse`, which solves for the motion of the body under forces by the stored LU factors.
+    points, n the number of all contact points that this rank owns. x has `size` owned entries, its first ones are
+    fields.
 
     Attributes:
         columns: changes of x under these unit forces, locally owned rows, shape (size, 2 m).
