@@ -300,10 +300,7 @@ class FaceContact:
         return self._of_unknowns(symmetric_stiffness(self.law, x, self.history)), self._of_unknowns(both)[:, ::2, ::2]
 
     def one_sided_change(self, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the one-sided stiffness of the points minus that in the last tangent, stress/length, 0 if negligible.
-
-        Shape (n, components, components).
-        """
+        """Return one-sided minus last stiffness of points, (n, components, components), 0 if negligible."""
         change = self._stiffness(fields, control, True) - self._in_tangent
         least = NEGLIGIBLE * np.abs(self._in_tangent).max((1, 2), keepdims=True)
         return np.where(np.abs(change).max((1, 2), keepdims=True) > least, change, 0.0)

@@ -42,10 +42,7 @@ class Rule(Protocol):
         """Share of each point in the reference contact length, shape (n,), length; in three dimensions an area."""
 
     def displacement(self, values: np.ndarray) -> np.ndarray:
-        """Return the displacement of the points, shape (n, components) or (n, components, k); collective.
-
-        values: locally owned unknowns in the same unit, shape (m,) or (m, k).
-        """
+        """Return displacements, (n, components[, k]), of points by owned unknowns, (m[, k]), same unit; collective."""
 
     def add(self, values: np.ndarray, forces: np.ndarray) -> None:
         """Add forces at the points, shape (n, components), to owned entries of the residual in place; collective."""
@@ -57,10 +54,7 @@ class Rule(Protocol):
         """
 
     def nodal_stiffness(self, stiffness: np.ndarray) -> np.ndarray:
-        """Return the stiffness by the m unknowns (`dofs`) of each point, shape (n, m, m).
-
-        stiffness: derivative of the force at a point by its position, shape (n, components, components).
-        """
+        """Return stiffness by the unknowns `dofs`, (n, m, m), from that by positions, (n, components, components)."""
 
     def at_points(self, values: np.ndarray) -> np.ndarray:
         """Interpolate values at the `nodes` of each point, shape (n,) or (n, nodes), to the points, shape (n,)."""

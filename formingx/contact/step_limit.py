@@ -280,10 +280,7 @@ class EventPrediction(Protocol):
         """
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return the predicted path minus the tangent at an arc length: changes of x, shape (n,), and of the control.
-
-        None if it is zero or unknown.
-        """
+        """Return the path minus the tangent at an arc length, x (n,) and control; None if zero or unknown."""
 
 
 class EventPredictor(Protocol):
@@ -399,10 +396,7 @@ class StepLimit:
         return trial.events.bend(trial.length) if trial.events and found else None
 
     def check(self, old: Any, new: Any, length: float, ends: bool = False) -> StepRejection | None:
-        """Return reason and admissible fraction of a solved step that was too long for the contacts, or None.
-
-        `ends`: see `Approach.rejection`.
-        """
+        """Return reason and admissible fraction of a step too long for contacts, or None; ends: see `rejection`."""
         found = [c.rejection(old, new, self._n, length, ends) for c in self.active_contacts]
         return min(filter(None, found), key=lambda rejection: rejection.fraction, default=None)
 

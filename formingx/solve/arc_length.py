@@ -150,10 +150,7 @@ class Curve:
         return self._found
 
     def solve_again(self, new: State, equation: Constraint, old: State) -> State:
-        """Return the end of a step, solved for again from `new`, with another constraint or after a change of contact.
-
-        It keeps the kind, target and jump of `new`, and its direction.
-        """
+        """Solve for the end of a step again from `new`, whose kind, target, jump and direction it keeps."""
         found = self.solve(new.x, new.control, equation, new.kind, old)
         sense = float(np.sign(found.slope * new.slope)) or 1.0
         return replace(found, direction=sense * found.direction, slope=sense * found.slope, target=new.target,
@@ -317,10 +314,7 @@ class Curve:
         return self.solve(*self.interpolate(a, b, low), quantity.equation(target), "target", a)
 
     def state_at_fraction(self, a: State, b: State, fraction: float) -> State:
-        """Return the state in the plane normal to the tangent of `a`, at a fraction (0 to 1) of the Hermite cubic.
-
-        Raise `Failure` if Newton's method fails, or if an element is inverted.
-        """
+        """Return the state at a fraction of the Hermite cubic in the plane normal to `a`'s tangent, else `Failure`."""
         x, control = self.interpolate(a, b, fraction)
         return self.solve(x, control, self._plane(a, x, control), "step", a)
 
@@ -343,10 +337,7 @@ class Curve:
         return found
 
     def _plane(self, old: State, x0: Array, control0: float) -> Constraint:
-        """Return the constraint of the plane through (x0, control0) that is normal to the tangent of the state `old`.
-
-        Normality refers to the inner product of arc length. x0: locally owned entries, shape (n,).
-        """
+        """Return the constraint of the plane through x0, owned (n,), control0, normal to the tangent of `old`."""
         normal, weight = self.plane_normal(old), self.control_weight * old.slope
 
         def c(x: PETSc.Vec, control: float, gradient: PETSc.Vec) -> tuple[float, float]:
@@ -405,10 +396,7 @@ class Curve:
 
 
 def _stationary(a: State, b: State, chord: float) -> float:
-    """Return the position between two states, 0 at a, 1 at b, at which the cubic of the control is stationary.
-
-    The cubic has the controls and slopes of both states. chord: arc length of the straight line between the states.
-    """
+    """Return where the cubic of the control is stationary between states (0 to 1) of arc distance `chord`."""
     jump = (b.control - a.control) / chord
     c2, c1, c0 = 3 * (a.slope + b.slope - 2 * jump), 6 * jump - 4 * a.slope - 2 * b.slope, a.slope
     roots = np.roots([c2, c1, c0])

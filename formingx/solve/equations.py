@@ -151,10 +151,7 @@ class ActiveSet(Protocol):
         return np.zeros((0, 0))
 
     def activate(self, number: int, x: Array, control: float) -> None:
-        """Activate the contact that is item `number` of `Scene.items`; its history variables start at (x, control).
-
-        Raise `InputError` if its tool would be inside the body.
-        """
+        """Activate contact `number` of `Scene.items` at (x, control); a tool inside the body is an InputError."""
         return
 
 

@@ -102,10 +102,7 @@ class DirectSolver:
         self._ksp.solve(rhs, out)
 
     def solve_all(self, rhs: Array) -> Array:
-        """Return the solutions for right-hand sides as columns, locally owned rows, shape (n, m).
-
-        Together they take a fraction of the time of single ones.
-        """
+        """Return solutions for columns of right-hand sides, owned rows (n, m), faster than one by one."""
         given, found = self._dense(*rhs.shape)
         sparse = self._sparse(rhs)
         if sparse is None:

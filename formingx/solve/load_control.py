@@ -129,10 +129,7 @@ class FixedControlCurve(Curve):
         return control * other
 
     def _correct(self, old: State, length: float) -> State:
-        """Return the state at the control old.control + length old.slope.
-
-        Raise `Failure` if Newton's method fails, or if an element is inverted.
-        """
+        """Return the state at old.control + length old.slope, else raise `Failure`."""
         control = old.control + length * old.slope
         self._x.array_w[:] = self.guess_from_unloaded(old, control) if self._is_unloaded(old) else (
             old.x + length * old.direction)

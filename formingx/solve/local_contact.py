@@ -403,18 +403,12 @@ class _Points(FacePoints):
         return found if np.isfinite(found).all() else None
 
     def _moved(self, dx: Array, step: Array | float) -> Array:
-        """Return the motions of the m points by dx, shape (n,) or (n, k), and step; collective.
-
-        They are relative to the tools, shape (m c,) or (m c, k), length.
-        """
+        """Return motions relative to tools, (m c[, k]), length, by dx (n[, k]) and step; collective."""
         motions = np.concatenate([face.relative_motion(dx, step) for face in self._faces])
         return self.values_at(motions).reshape(-1, *dx.shape[1:])
 
     def _motions(self, y: Array) -> list[Array]:
-        """Return the motions of the p owned points of each face, shape (p, c), 0 for points that are not chosen.
-
-        y: motions of the m points, shape (m c,), length.
-        """
+        """Return motions (p, c), length, of owned points of each face from y (m c,), 0 for points not chosen."""
         motions = np.zeros((self.starts[-1], self._c))
         self.spread(y.reshape(-1, self._c), motions)
         return self.of_faces(motions)

@@ -191,10 +191,7 @@ class QuantityRun(Run):
         return best
 
     def _state_at_target(self, old: State, target: Target, quantity: Quantity, low: float, high: float) -> State:
-        """Return the state, one step after `old`, at which a quantity meets its target, at a time from `low` to `high`.
-
-        Raise `Failure` if no such state was found.
-        """
+        """Return the state, one step after `old`, that meets a target at a time from `low` to `high`, or `Failure`."""
         found: dict[float, State] = {}
 
         def deviation(time: float) -> float:

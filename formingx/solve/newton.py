@@ -379,10 +379,7 @@ class BorderedNewton:
             self.F.array_w += self._drag.forces(x.array_r)
 
     def _check(self, history: list[Iteration], active: ActiveSetChanges, moved: float) -> None:
-        """Raise `Failure` if the iteration diverges, cycles or takes too long.
-
-        history: iterations so far. active: changes of the active set. moved: size of the last correction.
-        """
+        """Raise `Failure` if the iteration diverges, cycles or takes too long; moved: size of the last correction."""
         settings, quiet = self.settings, history[active.changed:]
         grown = len(quiet) >= 2 and quiet[-1].correction > (quiet[0].correction if len(quiet) > 2 else 0.5)
         diverged = len(history) > 2 and min([i.correction for i in history[-3:]]) > settings.divergence_correction

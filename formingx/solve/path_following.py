@@ -377,10 +377,7 @@ class Run:
         return [self._corrected(old, first), *rest]
 
     def _corrected(self, old: State, new: State) -> State:
-        """Return the state `new` of a step from `old` after contact has come to rest; may raise `Failure`.
-
-        Contacts in three dimensions open and close points between steps only.
-        """
+        """Return `new`, a step from `old`, after contacts open and close points in three dimensions, or `Failure`."""
         limit = self.problem.contact.limit
         corrections = limit.corrections if limit else None
         if not corrections or new.kind == "limit point":

@@ -134,19 +134,13 @@ class Execution:
         return setting.amplitude(number, control) * self.problem.description.scales[number]
 
     def _enter(self, base: list[float], rate: list[float], piece: int, control: float, fading: bool = False) -> None:
-        """Set new step data in the problem for a piece of the stage; an amplitude is base + rate times the control.
-
-        fading: True if forces of changed items decrease to 0 as the control goes to 1.
-        """
+        """Set step data, base + rate control, of a piece; fading: forces of changed items fade as control goes to 1."""
         changed = sorted(set(self.problem.setting.inactive) ^ set(self._inactive)) if fading else []
         setting = StepData(base, rate, self._inactive, fading, self._k, piece, changed, self.problem.setting.mesh)
         self.problem.enter(setting, self._present()[1], control)
 
     def _resumed(self, control: float) -> State:
-        """Return the current state as the first of a run with new step data, which has another control and tangent.
-
-        Raise `ConvergenceError` if the tangent is singular, or if no first equilibrium was found.
-        """
+        """Return the current state under new step data, with its control and tangent, else a ConvergenceError."""
         if not self.record.states:
             return begin(self.curve)
         try:
@@ -210,10 +204,7 @@ class Execution:
         self._trace(self._open_targets(), control)
 
     def _enter_control(self, numbers: list[int], clocked: bool = True) -> float:
-        """Set step data with the amplitude of the items `numbers` as the control; return its current value.
-
-        clocked: True if process time may pass while the control changes.
-        """
+        """Set data with items `numbers` as the control; return its value; clocked: time may pass meanwhile."""
         base, rate, control = control_step_data(self._amplitudes(), self.problem.description.scales, numbers,
                                                 self._stage, clocked)
         self._enter(base, rate, 1, control)

@@ -73,10 +73,7 @@ class RunTargets:
             self.open = [(t, b) for t, b in self.open if t is not target]
 
     def within_reach(self, old: State, length: float) -> tuple[Target | None, Quantity | None, float]:
-        """Return (target, its quantity, arc length) of the first open target within a step, by linear extrapolation.
-
-        Without one, return (None, None, length).
-        """
+        """Return (target, quantity, arc length) first met in a step, linearly, or (None, None, length)."""
         best: tuple[Target | None, Quantity | None, float] = (None, None, length)
         for target, quantity in self.open:
             left, rate = self._curve.target_residual(quantity, target.value, old)
@@ -169,10 +166,7 @@ class Progress:
         self._gained_then = 0.0
 
     def show(self, gained: float, states: int, length: float) -> None:
-        """Show a completed step: progress from 0 to 1, number of states, and length of the next step.
-
-        The length is an arc length, or a fraction of the duration of a `QuantityRun`; dimensionless.
-        """
+        """Show a step: progress 0 to 1, number of states, next length (arc, or share of a `QuantityRun`)."""
         self._gained, self._states, self._length = gained, states, length
         if self._bar is not None:
             self._bar.n = min(max(gained, 0.0), 1.0)

@@ -170,10 +170,7 @@ class Record:
         self.counts.steps += state.kind != "start"
 
     def complete_step(self, step: StepControl, until: Target, **entries: Any) -> None:
-        """Store the data with which the run continues in the last state, and call `hooks.on_step`.
-
-        `entries` are numbers, lists and dicts that a checkpoint can hold.
-        """
+        """Store data to continue with, numbers, lists and dicts, in the last state; call `hooks.on_step`."""
         self.last.stepping = {"step": asdict(step), "counts": asdict(self.counts), "until": [until.name, until.value],
                               "column": self.curve.problem.description.shown(0.0)[0].replace(" ", "_"), **entries}
         for listener in self.hooks.on_step:

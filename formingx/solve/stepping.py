@@ -80,10 +80,7 @@ class StepControl:
 
 
 def allowed(caller: str, accuracy: str | float) -> float:
-    """Return the relative error of stress and thickness that an accuracy allows.
-
-    accuracy: "draft", "standard" or "fine" (`ACCURACY`), or the error itself, between 0 and 1; else `InputError`.
-    """
+    """Return the relative error that "draft", "standard", "fine" or a number in (0, 1) allows, else InputError."""
     if isinstance(accuracy, str):
         if accuracy not in ACCURACY:
             raise InputError(f"{caller}: accuracy = {accuracy!r}: must be one of {', '.join(map(repr, ACCURACY))},"

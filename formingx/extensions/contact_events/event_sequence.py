@@ -209,10 +209,7 @@ class ContactEventSequence:
         return self._points.of_faces(self._piece(length).after(length).positions)
 
     def bend(self, length: float) -> tuple[np.ndarray, float] | None:
-        """Return x and control of the predicted path at an arc length, minus those on the tangent.
-
-        The change of x has the locally owned entries, shape (size,). The result is None if it is 0 or not finite.
-        """
+        """Return x (size,) and control of the path minus the tangent at an arc length; None if 0 or not finite."""
         piece, m = self._piece(length), len(self._points.ids)
         if self._end is not None and piece.begins < self._end.begins <= length:
             piece = self._end                               # in equilibrium there
@@ -432,10 +429,7 @@ class ContactEventSequence:
         return arc_lengths
 
     def _anderson_mixture(self, tried: list[tuple[PathSegment, PathSegment]]) -> PathSegment | None:
-        """Return the combination of equilibrium iterates by Anderson acceleration (1965); None if they diverge.
-
-        tried: pairs (segment before an iteration, segment after it).
-        """
+        """Return Anderson's (1965) mixture of (segment before, after) iterations; None if they diverge."""
         changes = np.array([(after.positions - before.positions).ravel() for before, after in tried])
         gram = combined(self._comm, changes @ changes.T)
         if not gram.trace() < FAR:
@@ -479,10 +473,7 @@ class ContactEventSequence:
         return piece._replace(correction=(piece.correction[0] + change[0], piece.correction[1] + change[1]))
 
     def _learn(self, length: float) -> bool:
-        """Compute and store the compliance of the point that closed last, and of those that close next before `length`.
-
-        Return False if the stored LU factors no longer belong to the state.
-        """
+        """Learn compliances of the last and the next points to close; return False if the factors are outdated."""
         last, closure, points, chosen = self._pieces[-1], self._closures[-1], self._points, []
         left = length - last.begins
         arc_lengths = self._gap_closures(last, left)
