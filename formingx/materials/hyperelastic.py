@@ -126,9 +126,6 @@ class Yeoh(Material):
         .. math:: c_{10}, \qquad c_{20} + 0.99 \sqrt{3 \, c_{10} c_{30}}, \qquad \sqrt{c_{30}}
 
         All lower bounds are 0: then the constants are admissible, with a margin of 1 % for c20.
-
-        Returns:
-            List of (value, lower bound, upper bound).
         """
         c10, c20, c30 = self.parameters.values()
         return [(x, 0, math.inf) for x in (c10, c20 + 0.99 * math.sqrt(3 * c10 * c30), math.sqrt(c30))]
@@ -307,9 +304,6 @@ class Ogden(Material):
         """Return the variables that a fit changes: all mu_k, then all alpha_k, with bounds.
 
         Each variable keeps its sign, and alpha_k lies between -30 and 30.
-
-        Returns:
-            List of (value, lower bound, upper bound).
         """
         values = list(self.parameters.values())
         largest = [math.inf] * (len(values) // 2) + [30.0] * (len(values) // 2)

@@ -110,14 +110,6 @@ class GeneralisedMaxwell(RelaxingMaterial):
         .. math:: \sqrt{\max \mathrm{eig}(J^{-2/3} F M F^T)}, \qquad M = C_v^{-1} \text{ or } A
 
         Cv or A is the internal variable of the branch, and J the determinant of F.
-
-        Args:
-            F: deformation gradient in the state (UFL, shape (3, 3)).
-            internal: {name: internal variable in the state (UFL, shape (4,))}.
-            constants: values of the constants by name.
-
-        Returns:
-            List of stretches (UFL scalars), one for each branch.
         """
         scale = kinematics.volume_ratio(F) ** (-2 / 3)
         found = []
@@ -135,13 +127,6 @@ class GeneralisedMaxwell(RelaxingMaterial):
 
         The first term is the equilibrium energy, mu_k the shear modulus of branch k, and :math:`\bar C` the isochoric
         right Cauchy-Green tensor.
-
-        Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            constants: values of the constants by name.
-
-        Returns:
-            Energy (UFL, stress).
         """
         mu = sum(mu for _, mu, _ in self._branches(constants))
         return self._relaxed_energy(F, constants) + mu / 2 * (inner(isochoric(F), IDENTITY) - 3)
@@ -153,14 +138,6 @@ class GeneralisedMaxwell(RelaxingMaterial):
 
         For `Viscoelastic` :math:`\psi_k = \mathrm{tr}(\bar C C_{v,k}^{-1}) - 3`, for `TransientNetwork`
         :math:`\psi_k = \mathrm{tr}(\bar C A_k) - 3 - \ln \det A_k`, with the isochoric tensor :math:`\bar C`.
-
-        Args:
-            F: deformation gradient in the state (UFL, shape (3, 3)).
-            internal: {name: internal variable in the state (UFL, shape (4,))}.
-            constants: values of the constants by name.
-
-        Returns:
-            Energy (UFL, stress).
         """
         C = isochoric(F)
         return self._relaxed_energy(F, constants) + sum(
@@ -174,31 +151,13 @@ class GeneralisedMaxwell(RelaxingMaterial):
 
         For `Viscoelastic` :math:`d_k = |\mathrm{dev}(\bar F C_{v,k}^{-1} \bar F^T)|^2`, for `TransientNetwork`
         :math:`d_k = \mathrm{tr}(\bar C A_k) + \mathrm{tr}(\bar C A_k)^{-1} - 6`. Bars denote isochoric parts.
-
-        Args:
-            F: deformation gradient in the state (UFL, shape (3, 3)).
-            internal: {name: internal variable in the state (UFL, shape (4,))}.
-            constants: values of the constants by name.
-
-        Returns:
-            Power (UFL, stress over time), 0 or larger.
         """
         C = isochoric(F)
         return sum(mu / (2 * tau) * ufl.max_value(self._dissipated(C, entries(internal[f"{self._tensor}_{k}"])), 0)
                    for k, mu, tau in self._branches(constants))
 
     def step_energy(self, F: Any, internal: dict[str, Any], time_step: Any, **constants: Any) -> Any:
-        """Return the potential of a step in time, whose derivative by F is the nominal stress at the end of the step.
-
-        Args:
-            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
-            internal: {name: internal variable at the beginning of the step (UFL, shape (4,))}.
-            time_step: length of the step (UFL scalar, time), 0 or larger.
-            constants: values of the constants by name.
-
-        Returns:
-            Potential per reference volume (UFL, stress).
-        """
+        """Return the potential of a step in time, whose derivative by F is the nominal stress at its end."""
         C = isochoric(F)
         past = self._past(internal, time_step)
         return self._relaxed_energy(F, constants) + sum(
@@ -209,15 +168,6 @@ class GeneralisedMaxwell(RelaxingMaterial):
         """Return the internal variables at the end of a step in time.
 
         They also change in steps of length 0, because the stored C is the value at the end of the step.
-
-        Args:
-            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
-            internal: {name: internal variable at the beginning of the step (UFL, shape (4,))}.
-            time_step: length of the step (UFL scalar, time), 0 or larger.
-            constants: values of the constants by name.
-
-        Returns:
-            {name: internal variable at the end of the step (UFL, shape (4,))}.
         """
         C = isochoric(F)
         past, after = self._past(internal, time_step), self._deformation_history(C, internal, time_step)
@@ -323,9 +273,6 @@ class GeneralisedMaxwell(RelaxingMaterial):
         r"""Return the variables that a fit changes in place of the constants.
 
         They are the variables of the equilibrium energy, then :math:`\ln \mu_k` and :math:`\ln \tau_k` of each branch.
-
-        Returns:
-            List of (value, lowest, highest).
         """
         first = [] if (rest := self.equilibrium) is None else rest.coordinates()
         return first + [(math.log(value), -math.inf, math.inf) for pair in self.branches for value in pair]

@@ -134,13 +134,6 @@ class Solidification(Material):
 
         The first term is the energy of the base material. G is the modulus and phi the fraction of the solidified
         material. C is the isochoric right Cauchy-Green tensor.
-
-        Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            constants: values of the constants by name.
-
-        Returns:
-            Energy (UFL, stress).
         """
         phi = ufl.max_value(ufl.min_value(ufl.ln(constants["set_end"]), 1.0), 0.0)
         return self._base.strain_energy(F, **self._of_base(constants)) \
@@ -159,15 +152,6 @@ class Solidification(Material):
         Indices n and n + 1 denote the beginning and the end of the step. C is the isochoric right Cauchy-Green tensor
         at the end, and G the shear modulus of the solidified material. A is the integral of C^-1 over the solidified
         fraction (`Solidification`). The first term is the potential of the base material.
-
-        Args:
-            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
-            internal: {name: internal variable at the beginning of the step (UFL)}.
-            time_step: length of the step (UFL scalar, time).
-            constants: values of the constants by name.
-
-        Returns:
-            Potential per reference volume (UFL, stress).
         """
         A, begin, end = self._begin(internal, constants)
         born = ufl.max_value(end - begin, 0) / 2

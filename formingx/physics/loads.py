@@ -133,14 +133,6 @@ class Pressure(Load):
 
         H is the change of the deformation gradient F by the mode, and N the reference normal.
         `formingx.physics.kinematics.cofactor_change` gives the change of the cofactor.
-
-        Args:
-            body: a `formingx.forms.loaded_body.LoadedBody` with the displacement amplitudes (u_r, u_z, u_hoop): `mode`
-                of the mode, `dmode` of its variation (UFL, shape (3,), length). Its `H` is H (UFL, shape (3, 3)).
-            value: pressure p (UFL scalar, stress).
-
-        Returns:
-            UFL form, bilinear in `body.mode` and `body.dmode`.
         """
         face = body.face(self.on, self.quadrature_degree)
         N = ufl.as_vector([face.normal[0], face.normal[1], 0])
@@ -155,12 +147,6 @@ class Pressure(Load):
         .. math:: p = \frac{\mu \, h}{L}, \qquad h = \frac{V}{A}
 
         Here mu is the largest shear modulus, L the largest extent and V the volume of the body, and A the loaded area.
-
-        Args:
-            body: a `formingx.forms.loaded_body.LoadedBody`.
-
-        Returns:
-            Pressure, stress.
         """
         return body.stress * body.thickness(self.on) / body.length
 
@@ -226,14 +212,6 @@ class CentrifugalLoad(Load):
 
         U, W and V are the amplitudes along r, z and the hoop direction. Omega is the reference volume, rho the density
         and omega the angular speed.
-
-        Args:
-            body: a `formingx.forms.loaded_body.LoadedBody` with the displacement amplitudes (u_r, u_z, u_hoop): `mode`
-                of the mode, `dmode` of its variation (UFL, shape (3,), length).
-            value: omega^2 (UFL scalar, 1/time^2).
-
-        Returns:
-            UFL form, bilinear in `body.mode` and `body.dmode`.
         """
         return value * _weighed(body, self.density, body.mode[0] * body.dmode[0] + body.mode[2] * body.dmode[2])
 

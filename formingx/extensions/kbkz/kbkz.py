@@ -115,43 +115,19 @@ class KBKZ(RelaxingMaterial):
         return np.atleast_1d(sum(G for G, _ in self.spectrum) + equilibrium)
 
     def strain_energy(self, F, **constants):
-        """Return the energy of the instantaneous response without damping, which gives moduli and stresses at F = I.
-
-        Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            constants: values of the constants by name.
-
-        Returns:
-            Energy (UFL, stress).
-        """
+        """Return the energy of the instantaneous response without damping, which gives moduli and stresses at F = I."""
         G = sum(G for G, _ in self.spectrum)
         return G / 2 * (inner(isochoric(F), (1, 1, 0, 1)) - 3) + self._relaxed_energy(F, constants)
 
     def step_energy(self, F, internal, time_step, **constants):
         """Return a potential whose derivative by F is the stress at the end of a step; it is no energy.
 
-        Args:
-            F: deformation gradient at the end of the step (UFL, shape (3, 3)).
-            internal: {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
-            time_step: length of the step (UFL scalar, time).
-            constants: values of the constants by name.
-
-        Returns:
-            Potential (UFL, stress).
+        `internal` is {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
         """
         return self.integral.potential(isochoric(F), internal, time_step) + self._relaxed_energy(F, constants)
 
     def stored_energy(self, F, internal, **constants):
-        """Return `step_energy` for a step of length 0: its derivative by F is the stress; its value has no meaning.
-
-        Args:
-            F: deformation gradient (UFL, shape (3, 3)).
-            internal: {name: coefficient of the form}, with the names of `MemoryIntegral.coefficients`.
-            constants: values of the constants by name.
-
-        Returns:
-            Potential (UFL, stress).
-        """
+        """Return `step_energy` for a step of length 0: its derivative by F is the stress; its value has no meaning."""
         return self.step_energy(F, internal, 0.0, **constants)
 
     def _modulus(self, times):

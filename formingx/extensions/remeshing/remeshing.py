@@ -111,11 +111,7 @@ class Remesh(RunExtension):
         _check(caller, scene, targets)
 
     def attach(self, path: Any) -> None:
-        """Let a run check its mesh at each state and continue on new meshes.
-
-        Args:
-            path: the `Path` that the run continues.
-        """
+        """Let a run check its mesh at each state and continue on new meshes."""
         record = path.record
         record.hooks.renew = functools.partial(_run_with_remeshing, path, self, record.curve.newton.tolerances)
 

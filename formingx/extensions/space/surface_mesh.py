@@ -61,11 +61,7 @@ class SurfaceMesh(Mesh):
         check_surface(*self.whole(), "the mesh")
 
     def facets_of(self, boundary: str) -> np.ndarray:
-        """Return the local numbers of the edges on a boundary, shape (k,); all edges for a face.
-
-        Args:
-            boundary: name of the boundary.
-        """
+        """Return the local numbers of the edges on a boundary, shape (k,); all edges for a face."""
         if boundary in self.faces:
             edges = self.domain.topology
             edges.create_entities(1)

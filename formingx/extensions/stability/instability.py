@@ -320,11 +320,7 @@ class InstabilityCondition(RunExtension):
         self.modes = modes
 
     def attach(self, path: Any) -> None:
-        """Let the run count unstable modes in its last state after each step, and end when one has become unstable.
-
-        Args:
-            path: the `Path` that the run continues.
-        """
+        """Let the run count unstable modes in its last state after each step, and end when one has become unstable."""
         analysis, numbers = StabilityAnalysis(path), wave_numbers(path.problem.scene, self.modes)
         first: dict[ModeClass, int] = {}
 
