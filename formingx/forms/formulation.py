@@ -347,10 +347,7 @@ class Formulation(ABC):
 
     @abstractmethod
     def nearest(self, points: np.ndarray) -> np.ndarray:
-        """Return the points on the mesh of the fields for points of the body, shape (n, 2), length.
-
-        For a solid they are the points themselves, for a membrane those of the mid-surface at the same R.
-        """
+        """Return points (n, 2), length, on the fields' mesh: the same, or of the mid-surface at the same R."""
 
     @abstractmethod
     def weighted(self, density: Any, layers: list[str], metadata: dict | None = None) -> Any:

@@ -83,10 +83,7 @@ class MaterialTerms:
         return found
 
     def temperature_coefficient(self, function: Any) -> Any:
-        """Return f(T) (UFL scalar) at the quadrature points of the energy, at the end of a step.
-
-        A constant named in `Material.flow_constants` is evaluated in the middle of the step.
-        """
+        """Return f(T) (UFL scalar) at the end of a step, or in its middle for `Material.flow_constants`."""
         forms, found = self.forms, self.quadrature_function()
         law = forms.mean_over_depths(getattr(function, "clamped", function), self)   # a user's may be any function
         coefficient = TemperatureCoefficient(forms, found, [(self.cells, law)], [forms.temperatures(self)])

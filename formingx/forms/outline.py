@@ -72,10 +72,7 @@ class Outline:
         return order
 
     def pieces(self, edges: np.ndarray, parts: int) -> tuple[np.ndarray, np.ndarray]:
-        """Divide curved edges (start, end, midpoint), shape (m, 3, 2), length, into straight pieces.
-
-        Return points, shape (n, 2), length, and the end numbers of each piece, shape (m parts, 2).
-        """
+        """Return straight pieces of curved edges (m, 3, 2), length: points (n, 2), end numbers (m parts, 2)."""
         m, corners = len(edges), int(self.ends.max()) + 1
         points = np.empty((corners + m * (parts - 1), edges.shape[-1]))
         points[self.ends] = edges[:, :2]

@@ -154,10 +154,7 @@ class MidSurfaceProbe(Probe):
         self._tangent = np.where(self._meet[:, None], both / self._mean_length, self._tangent)
 
     def _mean_over_elements(self, values: np.ndarray) -> np.ndarray:
-        """Return the mean of a vector over both elements at points where two elements meet, shape (n, 2); collective.
-
-        values: at the ends of elements, in the order of `_ends`, shape (ends, 2).
-        """
+        """Return means (n, 2) over both elements that meet of values (ends, 2), in the order of `_ends`; collective."""
         total = np.zeros((len(self.points), self._components))
         np.add.at(total, self._ends[0], values / 2)
         return self._problem.comm.allreduce(total, MPI.SUM)
@@ -203,10 +200,7 @@ def _normal(tangents: np.ndarray) -> np.ndarray:
 
 
 def _basis(element: Any, derivative: int, reference: np.ndarray) -> np.ndarray:
-    """Return the dim shape functions of an element, or first derivatives on an interval, at m points, shape (m, dim).
-
-    reference: coordinates in the reference cell, shape (m, dimension of the cell).
-    """
+    """Return shape functions, or first derivatives on an interval, at reference points (m, dimension), (m, dim)."""
     if not len(reference):                             # basix does not take an empty set
         return np.zeros((0, element.dim))
     return element.tabulate(derivative, reference)[derivative].reshape(len(reference), element.dim)

@@ -78,10 +78,7 @@ class ExtendedMatrix:
         return A
 
     def _pattern(self, rows: list[np.ndarray], m: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sparsity pattern: row pointers and global column numbers of all locally owned rows.
-
-        rows: rows of the constraint matrix C, locally owned entries, shape (n,) each. m: their number.
-        """
+        """Return row pointers and global columns of owned rows, with m rows (n,) each of the constraint matrix C."""
         plain = fem_petsc.create_matrix(self._form)
         _compat.assemble_matrix(plain, self._form, self._bcs)
         plain.assemble()

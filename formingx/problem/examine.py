@@ -49,10 +49,7 @@ class Examination:
             self._tools = tooling.placed(tooling.travels(last.setting, last.control))
 
     def _find_worst(self, elements: Body) -> None:
-        """Store the smallest J, the worst shape of an element, and the largest use of a material's stretch limit.
-
-        The use is (I1 - 3) / (limit of I1 - 3), with tr F^T F as I1. `facts` gets them under names of `Diagnosis`.
-        """
+        """Store smallest J, worst shape and largest (I1 - 3)/limit, with I1 = tr F^T F, of elements in `facts`."""
         problem, facts = self._problem, self.facts
         facts["smallest_J"], facts["at_J"], at = _smallest_J(problem, elements)
         facts["shape"] = float((elements.quality / elements.initial_quality).min())
@@ -66,10 +63,7 @@ class Examination:
             self._marks.append(("nearest to the material's limit", elements.deformed_points[at]))
 
     def _find_compressed(self, elements: Body) -> None:
-        """Store the mean stretch and both ends of the longest part of a sheet that is compressed along its section.
-
-        elements: the elements in the last good state. The values are stored in `facts["shortened"]`.
-        """
+        """Store mean stretch and ends of the longest part compressed along its section in `facts["shortened"]`."""
         columns = self._problem.scene.mesh.columns
         if columns is None:
             return
@@ -89,10 +83,7 @@ class Examination:
                                        tuple(line[piece[0]].tolist()), tuple(line[piece[-1] + 1].tolist()))
 
     def _examine_attempt(self, x: Any, attempt: Any) -> None:
-        """Store the smallest J, the residual and the number of changes of contact status of the failed attempt.
-
-        x: work vector of unknowns. attempt: the last iterate. The values are stored in `facts`.
-        """
+        """Store smallest J, residual and number of status changes of the failed attempt in `facts`; x: work vector."""
         problem, facts = self._problem, self.facts
         x.array_w[:] = attempt.x
         failed = body(problem, x, attempt.control)
@@ -104,10 +95,7 @@ class Examination:
         facts["flipped"] = _status_changes(problem, attempt)
 
     def draw(self, file: Any, title: str) -> None:
-        """Draw the deformed last good state with J, the worst points and the tools to a file; rank 0 draws.
-
-        Raise `InputError` for a membrane, which has no elements to draw, or without a good state.
-        """
+        """Draw the last good state with J, worst points and tools on rank 0; a membrane, or none, is an InputError."""
         if self._elements is None:
             raise InputError("Diagnosis.picture: there are no elements to draw: a membrane has none across its"
                              " thickness, and without a good state there is no shape")

@@ -160,10 +160,7 @@ class Problem:
         return self.forms.temperature
 
     def set_fields(self, x: np.ndarray, control: float | None = None) -> None:
-        """Set the fields of the forms from x, shape (n,), and update the coefficients that depend on them.
-
-        control: of the forms; None: it stays.
-        """
+        """Set the fields from x (n,), coefficients that depend on them, and the control, None: as it is."""
         if control is not None:
             self._control[()] = control
         self._fields[: self.n_owned] = x[: self.n_owned]
@@ -248,10 +245,7 @@ class Problem:
         return self._forces(x.array_r[: self.n_owned], control)
 
     def body_forces(self, x: np.ndarray, control: float) -> np.ndarray:
-        """Return the internal minus external forces without contact and constraints; dimensionless, shape (n,).
-
-        In equilibrium supports and tools supply them.
-        """
+        """Return internal minus external forces (n,), dimensionless, which contact and supports balance."""
         self.set_fields(x, control)
         return self.assemble(self._residual)
 
@@ -331,10 +325,7 @@ class Problem:
             self._fields[:], self._control[()] = fields, control
 
     def restore(self, state: Any) -> None:
-        """Restore step data, history variables and process time of an accepted state, to start a step from it.
-
-        `state` has the attributes of `state_context`.
-        """
+        """Restore step data, history variables and process time of an accepted state, to start a step from it."""
         if self.history.path_dependent:
             self.history.variables = state.history_variables
         if state.setting:

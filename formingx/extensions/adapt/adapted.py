@@ -74,10 +74,7 @@ def adapted(path: Any, *, max_rotation: float | None = 1 / 3, error: float | Non
 
 
 def _adapted_sheet(mesh: Any, points: np.ndarray, sizes: np.ndarray) -> Mesh:
-    """Return a new mesh of a flat sheet with triangles of given sizes, shape (n,), at points (n, 2), length.
-
-    Sizes are linear between points. A mesh that is no `sheet`, or whose nodes were moved, is an InputError.
-    """
+    """Return a mesh of a flat `sheet` by sizes (n,), linear between points (n, 2), length; others are an InputError."""
     from scipy.interpolate import LinearNDInterpolator
     from scipy.spatial import cKDTree
     if mesh.of_size is None:

@@ -23,10 +23,7 @@ _RANGE = "its range, or of its start value if a bound is missing"
 
 
 def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """Write the report of a search for design parameters as an HTML page (rank 0 writes), and return its path.
-
-    `deviations` is {parameter: standard deviation}, a `Fit`, a list of such, or None for no uncertainty.
-    """
+    """Write the HTML report of a search on rank 0, and return its path; deviations: as in `covariance_of`, or None."""
     units = _units_of(result.best, units)
     before, best, (a, b) = result.before, result.best, result.cv
     effects, spread = best.sensitivities("wall"), best.spread(deviations) if deviations else None
@@ -61,10 +58,7 @@ def of_search(result: Any, file: Any, title: str, deviations: Any, units: Units)
 
 
 def of_run(run: Any, file: Any, title: str, deviations: Any, units: Units) -> FilePath:
-    """Write the report of a run of a design as an HTML page (rank 0 writes), and return its path.
-
-    `deviations` is {parameter: standard deviation}, a `Fit`, a list of such, or None for no uncertainty.
-    """
+    """Write the HTML report of a run on rank 0, and return its path; deviations: as in `covariance_of`, or None."""
     units = _units_of(run, units)
     effects, spread = run.sensitivities("wall"), run.spread(deviations) if deviations else None
     wall = run.wall
@@ -146,10 +140,7 @@ def _sections(runs: list[Any], names: list[str], units: Units) -> str:
 
 
 def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations: Any, units: Units) -> None:
-    """Draw the wall of a run over the reference length, with a band of its standard deviation.
-
-    `spread` is the deviation at the k nodes, shape (k,), length; None for no band. `deviations` name the band.
-    """
+    """Draw the wall of a run with a band of its deviation `spread` (k,), length, or None; `deviations` name it."""
     s = run.reference_length
     axes.plot(s, run.wall, "." if run.in_space else "-", color=colour, label=label)
     if spread is not None:
@@ -162,10 +153,7 @@ def _line(axes: Any, run: Any, colour: str, label: str, spread: Any, deviations:
 
 
 def _walls(result: Any, spread: Any, deviations: Any, units: Units) -> str:
-    """Return an HTML figure of wall thickness over arc length: of the first and the best run, predicted and wanted.
-
-    `spread` is the standard deviation of the best wall at the k nodes, shape (k,), length; None for no band.
-    """
+    """Return an HTML figure of walls, first, best, predicted and wanted, with a band `spread` (k,), length, or None."""
     drawing, axes = figure(1, width=9, height=4)
     s = result.best.reference_length
     line, dashed = (".", ".") if result.best.in_space else ("-", "--")

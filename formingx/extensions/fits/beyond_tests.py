@@ -81,10 +81,7 @@ def _tested(scene: Any) -> list[tuple[str, MeasuredRange]]:
 
 
 def _deformation(problem: Any, terms: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return strains (n, 2), positions (n, 2 or 3), volumes (n,) at all points of a material; collective.
-
-    The columns of strains are the largest and middle logarithmic strain; points of all ranks, length and length^3.
-    """
+    """Return largest and middle log strain (n, 2), positions (n, 2 or 3) and volumes (n,) on all ranks; collective."""
     forms, cells = problem.forms, terms.own_cells
     F = isochoric_gradients(forms, cells, terms.places)
     squares = np.linalg.eigvalsh(F.transpose(0, 2, 1) @ F)[:, ::-1]

@@ -273,10 +273,7 @@ def _fit_shifted(fitted: Callable, material: Any, tests: Any, temperatures: list
 def _fit_by_temperature(material: Any, files: Sequence[MeasuredTest | MeasuredOscillation], temperatures: list[float],
                         terms: int | None, relative: bool, weights: Any, within: Any, conversions: tuple[str, ...]
                         ) -> Fit:
-    """Fit an elastic material at each temperature; its constants become tables over the temperature.
-
-    A constant that cannot depend on it, such as an exponent, is an InputError.
-    """
+    """Fit an elastic material at each temperature, by tables; a constant that cannot be one is an InputError."""
     each: dict[float, Fit] = {}
     for T in sorted(set(temperatures)):
         points = Points(_elastic([f for f, at in zip(files, temperatures) if at == T]), relative, weights, within)

@@ -156,10 +156,7 @@ class ShiftedTests:
         self._equilibrium = _scaled(given.equilibrium, 1.0, largest_I1(self._rows))
 
     def branches(self, tau: np.ndarray, factors: np.ndarray) -> np.ndarray:
-        """Return the stresses of j branches of unit modulus at all measured points, shape (n, j).
-
-        The relaxation times tau, shape (j,), hold at the reference temperature; `factors` are the shifts of tests.
-        """
+        """Return stresses (n, j) of branches of unit modulus with times tau (j,) at the reference, shifts `factors`."""
         found = []
         for (low, high, branch), a in zip(self._branches, factors):
             log_tau = np.log(tau) + np.log(a)
@@ -246,10 +243,7 @@ def _guesses(data: _TimedData, material: GeneralisedMaxwell, n: int) -> list[Gen
 
 
 def _scaled(material: Material | None, factor: float, I1: float) -> Material | None:
-    """Return a first guess of an equilibrium with `factor` times the modulus, with finite stress up to I1.
-
-    A class without first guesses keeps the material; None stays None.
-    """
+    """Return the first guess of an equilibrium, if it has any, with `factor` times the modulus and finite up to I1."""
     if material is None:
         return None
     try:

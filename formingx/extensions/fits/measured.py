@@ -153,10 +153,7 @@ def _head(caller: str, rows: list[tuple[int, list[str]]]) -> tuple[int, dict[str
 
 def _checked_columns(caller: str, columns: dict[str, int], rows: list[tuple[int, list[str]]], start: int,
                      units: dict[str, Any], test: str | None) -> dict[str, int]:
-    """Return {quantity: column} of the columns that a fit uses, without unused columns of text.
-
-    An unused column of numbers, a missing column, or an unknown unit is an InputError.
-    """
+    """Return {quantity: column} that a fit uses; missing, unused numeric or unknown ones are an InputError."""
     what = ("must be test, stretch (or strain, displacement), stress (nominal, true, or force), and time if any")
     names = ", ".join(repr(name_and_unit(cell)[0]) for cell in rows[start - 1][1] if not is_number(cell))
     for needed in ((("test",),) if test is None else ()) + (_STRETCHES, _STRESSES):
@@ -203,10 +200,7 @@ def _point(where: str, row: list[str], width: int, columns: dict[str, int], test
 
 def _converted(caller: str, points: list[dict[str, Any]], units: dict[str, Any], specimen: Any
                ) -> tuple[list[dict[str, Any]], tuple[str, ...]]:
-    """Return points with stretch and nominal stress, and what was done as text.
-
-    A specimen whose size is missing, not positive, or not used is an InputError.
-    """
+    """Return points with stretch and nominal stress, and conversions as text; a wrong specimen is an InputError."""
     given = dict(check_type("fit: specimen", {} if specimen is None else specimen, Mapping,
                             "a dict such as {'length': 30.0, 'width': 4.0, 'thickness': 1.0}"))
     for name in given:

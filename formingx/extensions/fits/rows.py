@@ -37,10 +37,7 @@ class Rows(Protocol):
     stretches: np.ndarray
 
     def branch(self, law: Any, log_tau: np.ndarray, accuracy: float) -> Callable[[np.ndarray], np.ndarray]:
-        """Return a function that gives the values of k branches of unit modulus, shape (n, k).
-
-        Its argument has the logarithms of their relaxation times, shape (k,), in the range of the grid `log_tau`.
-        """
+        """Return a function of log tau (k,), within `log_tau`, to the values (n, k) of k branches of unit modulus."""
 
     def equilibrium(self, stress: np.ndarray) -> np.ndarray:
         """Return the values of the equilibrium, shape (n,), from its stresses at `stretches`, shape (m,)."""
@@ -125,10 +122,7 @@ def rows_of(test: TimedTest | OscillationTest) -> Rows:
 
 
 def equilibrium_values(rows: list[Rows], material: Material | None, constants: Any = None) -> np.ndarray:
-    """Return the values of an equilibrium (None: 0) in all rows, (n,); inf or nan beyond its limit.
-
-    The constants of the material are replaced by `constants` if these are given.
-    """
+    """Return an equilibrium's values (n,), None: 0, with `constants` if given; inf or nan beyond its limit."""
     if material is None:
         return np.zeros(sum(len(part.measured) for part in rows))
     values = material.parameters.values() if constants is None else constants

@@ -378,10 +378,7 @@ class HeatRun:
         return Spot(float(sign * value), R, Z)
 
     def _first_time_inside(self, excess: Any, times: list[float], from_time: float | None = None) -> float | None:
-        """Return the first time at which the function `excess` of time is 0 or negative; None if there is none.
-
-        The sign is examined at `times`, and from `from_time` on; the root between two of them is computed.
-        """
+        """Return the first time of `excess` <= 0 among `times`, from `from_time` on, or the root before; else None."""
         from scipy.optimize import brentq
         before = from_time
         for t in times:

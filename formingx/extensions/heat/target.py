@@ -24,10 +24,7 @@ _NEAR = 1e-4
 
 
 class PointTemperature(Quantity):
-    """Temperature of a material point, as an output quantity.
-
-    At a trial state the heat equation is solved from the last accepted state, with the body at the trial state.
-    """
+    """Temperature of a material point; for a trial state the heat equation is solved from the last accepted one."""
 
     size, smooth = 1.0, False
 

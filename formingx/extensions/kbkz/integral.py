@@ -45,10 +45,7 @@ class MemoryIntegral:
         return PastStates(forms, terms)
 
     def weights(self, ages: np.ndarray) -> np.ndarray:
-        """Return the weights w of K past states in the stress for modes of modulus 1, shape (K, modes[, n]).
-
-        Ages in reduced time descend to 0, shape (K,), or (K, n) if they differ between n points.
-        """
+        """Return weights (K, modes[, n]) of past states for unit modes, by ages in reduced time (K[, n]), down to 0."""
         x = ages[:, None] / (self.tau if ages.ndim == 1 else self.tau[:, None])
         step, young = x[:-1] - x[1:], np.exp(-x[1:])
         mean = _mean_decay(step)

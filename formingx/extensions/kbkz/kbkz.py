@@ -236,10 +236,7 @@ class KBKZ(RelaxingMaterial):
         return float(l[falls[0]]) if len(falls) else np.inf
 
     def _true_stress(self, mode: str, times: np.ndarray, stretches: np.ndarray, between: str) -> float:
-        """Return the true stress tau_1 - tau_3 of a test at the last of its times, without the equilibrium.
-
-        Times and stretches have shape (n,); `between` them, "stretch" or "strain" has a constant rate.
-        """
+        """Return tau_1 - tau_3 at the last of times (n,), without equilibrium; `between`: "stretch" or "strain"."""
         now, last = times[-1], stretches[-1]
         modulus, tau = np.array(self.spectrum).T
         initial = self._modulus(now - times[0]) * self._damped_difference(mode, last)
@@ -251,10 +248,7 @@ class KBKZ(RelaxingMaterial):
         return float(initial + np.sum(half * _WEIGHTS * memory * self._damped_difference(mode, relative)))
 
     def _panel_ends(self, times: np.ndarray, stretches: np.ndarray) -> np.ndarray:
-        """Return the ends of the quadrature panels of the memory integral, as ascending ages, shape (k,), time.
-
-        An age is the time from an instant of the test to the last of its times, shape (n,).
-        """
+        """Return the ends of quadrature panels as ascending ages (k,), from instants to the last of times (n,)."""
         whole, shortest = times[-1] - times[0], min(tau for _, tau in self.spectrum)
         count = max(0, int(np.log(max(2 * whole / shortest, 1)) / np.log(_PANEL_AGE_RATIO)) + 1)
         ages = [np.array([0, whole]), shortest / 2 * _PANEL_AGE_RATIO ** np.arange(count), times[-1] - times]

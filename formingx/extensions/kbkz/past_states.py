@@ -133,10 +133,7 @@ class PastStates:
 
     def transfer(self, source: PastStates, variables: StoredStates, x: np.ndarray, control: float,
                  mapping: Callable[[np.ndarray], np.ndarray]) -> StoredStates:
-        """Return the past states of a run on another mesh, interpolated to this mesh; collective.
-
-        mapping: reference points of the other mesh, shape (n, coordinates), to this mesh; x, control: not used.
-        """
+        """Return past states of another mesh here, by `mapping` of its reference points (n, components); collective."""
         interpolation = MovingLeastSquares(self._forms.comm, mapping(source.points), self.points)
         F = [isochoric_gradients(entry._forms, entry._own, entry._terms.places) for entry in (source, self)]
 

@@ -49,10 +49,7 @@ def _part_of_grid(grid: Grid, layers: dict[str, np.ndarray]) -> Grid:
 
 
 def _boundary_edges(triangles: np.ndarray) -> dict[frozenset[int], list[int]]:
-    """Return {set of both end nodes: [first, last, middle node]} of the edges that belong to one triangle only.
-
-    triangles: node numbers, shape (m, 3) or (m, 6); without midpoints the lists have no middle.
-    """
+    """Return {set of ends: [first, last, any middle]} of the edges of one triangle only, nodes (m, 3 or 6)."""
     found: dict[frozenset[int], list[list[int]]] = {}
     for row in ([int(node) for node in nodes] for nodes in triangles):
         for k, (i, j) in enumerate(_EDGES):

@@ -225,10 +225,7 @@ def _scene(scene: Scene, mesh: Mesh, heat: Any) -> Scene:
 
 
 class _FixedComponent(PinnedNode):
-    """Constraint of one displacement component of a node against rigid motion; a free body exerts no force on it.
-
-    The component is 0 for radial and 1 for axial; the node has a reference position, shape (2,), length.
-    """
+    """Constraint of a node, radial (0) or axial (1), against rigid motion; a free body exerts no force on it."""
 
     def __init__(self, component: int, point: np.ndarray):
         super().__init__(*point)

@@ -31,10 +31,7 @@ def save(problem: Any) -> dict[str, Any]:
 
 
 def load(before: tuple[Problem, State], data: dict[str, Any], state_transfer: Callable[..., Any]) -> Problem:
-    """Return the problem on a mesh that was made during a run, from its data and (problem, last state) before it.
-
-    Several ranks, or a mesh that gets another numbering than in the run, are an InputError.
-    """
+    """Return the problem on a mesh made during a run; several ranks or another numbering are an InputError."""
     scene = before[0].scene
     if scene.mesh.comm.size > 1:
         raise InputError("load: a remeshed run can be loaded on one rank only")

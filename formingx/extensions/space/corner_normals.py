@@ -116,10 +116,7 @@ def corner_groups(points: np.ndarray, triangles: np.ndarray, crease: float) -> n
 
 
 def _connected(m: int, i: np.ndarray, j: np.ndarray, tips: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Return the groups of corners that smooth edges connect, shape (m, 3).
-
-    i, j: the two sides of each smooth edge, shape (k,). tips: mask of vertices without connection, shape (n,).
-    """
+    """Return groups (m, 3) of corners that smooth edges, sides i and j (k,), connect, except at `tips`, mask (n,)."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
     s, k, t, l = i % m, i // m, j % m, j // m

@@ -196,10 +196,7 @@ class LaggedFriction(LaggedStick):
 
 
 class _Tractions(Tractions):
-    """Contact tractions whose `sense` is the direction of sliding as an angle in the tangent plane, radians.
-
-    It is measured from the first vector of `_basis` towards the second, and is 0 for a point that does not slide.
-    """
+    """Tractions whose `sense` is the angle of sliding from the first vector of `_basis`, radians; 0: no sliding."""
 
     @property
     def status(self) -> np.ndarray:

@@ -135,10 +135,7 @@ class PatchSurface:
 
 
 def _neighbours(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """Return the normals of the neighbour across each edge at the two ends of the edge, shape (m, 3, 2, 3).
-
-    Without exactly two triangles at an edge, they are those of the triangle itself.
-    """
+    """Return the normals (m, 3, 2, 3) of the neighbour across each edge at both ends; without one, the triangle's."""
     m = len(triangles)
     other = np.stack([np.stack([normals[:, k], normals[:, (k + 1) % 3]], 1) for k in range(3)], 1)
     i, j = sides_of_edges(triangles)

@@ -141,10 +141,7 @@ def shell_model(path: Any, file: Any, state: Any = None) -> None:
 
 
 def report(path: Any, file: Any, title: str, failure: Any, units: Units, density: float | None, trim: Any) -> FilePath:
-    """Write the report of a run in three dimensions as an HTML page, and return its path (rank 0 writes).
-
-    density: g/cm3, or None. trim: z of the plane at which the sheet is cut, length, or None.
-    """
+    """Write the HTML report of a run in three dimensions on rank 0, and return its path; see `Reader.report`."""
     from .part import part
     wall, last, comm = path.wall(), path.last, path.problem.comm
     planes, record = path.scene.symmetry, of_path(path)

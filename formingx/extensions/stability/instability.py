@@ -210,10 +210,7 @@ class StabilityAnalysis:
         return self._modes[key]
 
     def examine(self, modes: Iterable[float], states: Any) -> Stability:
-        """Count unstable modes in states of the path, and locate the critical points between them.
-
-        `modes` are wave numbers; `states` is a number of evenly spaced states, "all" or a list of states.
-        """
+        """Count modes of wave numbers in states (a number, "all", a list), and locate critical points between."""
         numbers = wave_numbers(self._path.problem.scene, modes)
         chosen = _selected_states(self._path, states)
         counts: dict[ModeClass, list[int]] = {}

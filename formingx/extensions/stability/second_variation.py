@@ -220,10 +220,7 @@ class SecondVariation:
         return form
 
     def _number_unknowns(self) -> None:
-        """Set the nodes, their unknowns, and the map from unknowns of the problem to unknowns of a mode.
-
-        The unknowns of a node are the amplitudes U, W and V of its radial, axial and hoop displacement.
-        """
+        """Set nodes, their unknowns (radial U, axial W, hoop V), and the map from the problem's to a mode's."""
         forms, problem = self._forms, self.problem
         index_map, old, new = self.space.dofmap.index_map, forms.space, self.space
         self._owned, size = index_map.size_local, index_map.size_local + index_map.num_ghosts

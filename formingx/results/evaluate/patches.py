@@ -52,10 +52,7 @@ class Patches:
         return found
 
     def _operator(self, chunk: slice) -> np.ndarray:
-        """Return matrices from values at the points of a patch to its cubic, shape (cells of the slice, 10, points).
-
-        The last columns are 0 for a patch with fewer points than the largest.
-        """
+        """Return matrices (cells of the slice, 10, points) from values in a patch to its cubic, 0 beyond its points."""
         if chunk.start in self._operators:
             return self._operators[chunk.start]
         patch = self._patch[chunk]

@@ -92,10 +92,7 @@ class Tension:
 
 
 def first_compression(path: Any) -> tuple[int, Resultant] | None:
-    """Return the number of the first state in which a membrane in a section is compressed, and its resultant.
-
-    The smallest resultant is meant; None without compression or without a membrane. Collective.
-    """
+    """Return number and resultant of the first compressed state of a membrane in a section, or None; collective."""
     k = 0
     for segment in path.record.segments:
         scene = segment.problem.scene

@@ -225,10 +225,7 @@ class EnergyBalance:
         return found
 
     def _nodes(self, contact: Any, fields: np.ndarray, control: float) -> np.ndarray:
-        """Return the owned displacement unknowns at the n nodes of a contact face, shape (n, 2).
-
-        If several contacts share the face, only nodes that touch this tool are returned.
-        """
+        """Return owned displacements (n, 2) of a face, if several contacts share it those of nodes in contact."""
         problem, dofs = self._problem, contact.rule.dofs
         if contact.contact.points == "nodes" and sum(c.contact.on == contact.contact.on for c in problem.contacts) > 1:
             return dofs[contact.touching(fields, control)]

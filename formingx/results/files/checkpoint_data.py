@@ -67,10 +67,7 @@ def ended(folder: Any) -> dict[str, Any] | None:
 
 
 def contents(folder: Any) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return scene.json, with "ended" from `ended`, and the attributes of each state, for a report without the scene.
-
-    A missing, empty or damaged checkpoint is an InputError.
-    """
+    """Return scene.json with `ended`, and states' attributes, for reports; a damaged checkpoint is an InputError."""
     folder = file_path("checkpoint", folder)
     about = read_json(folder / "scene.json")
     _check_format(folder, about)

@@ -110,10 +110,7 @@ def _sums(scene: Any, layer: str, fields: dict[str, Any]) -> dict[str, float]:
 
 
 def _mesh(problem: Any) -> dict[str, Any]:
-    """Return numbers by which a checkpoint recognises the mesh of a problem; collective.
-
-    They are counts of cells and facets, the extent, and weighted sums of the coordinates of the cells.
-    """
+    """Return counts, extent and weighted sums of cells' coordinates by which a mesh is recognised; collective."""
     mesh, domain, comm = problem.scene.mesh, problem.forms.domain, problem.comm
     cells = len(owned := own_cells(domain))
     x = cell_node_positions(domain, owned) / problem.forms.length

@@ -218,10 +218,7 @@ def _class_code(cls: type, inner: Callable[[Any], Any]) -> dict[str, Any]:
 
 
 def field_sums(field: Any) -> list[float]:
-    """Return two sums over the values of a DOLFINx function, the same on any number of ranks; collective.
-
-    The weights of the second sum depend on the position, so another value at any point changes it.
-    """
+    """Return two sums over a DOLFINx function, the second weighted by position, the same on any ranks; collective."""
     space = field.function_space
     points = space.tabulate_dof_coordinates()
     comm = original(space.mesh.comm)

@@ -44,10 +44,7 @@ def packed(text: str) -> str:
 
 def data(records: list[ReportData], names: list[str], units: Units, attempts: Attempts,
          extra: dict[str, Any] | None = None, charts: Sequence[dict[str, Any]] = ()) -> str:
-    """Return all data that `report.js` draws, as JSON text.
-
-    `extra` has further entries of each run, `charts` are drawn before the others. Drawings that fail are left out.
-    """
+    """Return all that `report.js` draws as JSON, `charts` first, `extra` in each run, without failed drawings."""
     runs = [_run(record, name, units, attempts) | (extra or {}) for record, name in zip(records, names)]
     kinds: list[tuple[str, Callable[[], list]]] = [
         ("the curves of forces and pressures", lambda: _loading(records, names, units)),

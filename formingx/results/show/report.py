@@ -264,10 +264,7 @@ def introduction(record: ReportData, units: Units) -> str:
 
 
 def _key_numbers(record: ReportData, units: Units) -> str:
-    """Return an HTML table of all output quantities, and of the smallest and largest wall over original thickness.
-
-    The values in each limit point and in the last state stand side by side.
-    """
+    """Return an HTML table of quantities and extreme walls over the original in limit points and the last state."""
     chosen = [k for k, kind in enumerate(record.kinds) if kind == "limit point"]
     head = ["", *(f"limit point {n}" for n in range(1, len(chosen) + 1)), "last state"]
     chosen.append(len(record.kinds) - 1)

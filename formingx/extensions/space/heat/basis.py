@@ -39,10 +39,7 @@ class Layer:
         self.weights, self.share = weights, share
 
     def gauss(self, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return depths (0 to 1 in the layer) and weights of a Gauss rule, shape (count,), and its shape functions.
-
-        The shape functions of the m points of the layer at these depths have the shape (count, m).
-        """
+        """Return depths in the layer and weights (count,) of a Gauss rule, and shape functions of points (count, m)."""
         at, weights = np.polynomial.legendre.leggauss(count)
         depths = (at + 1) / 2
         return depths, weights / 2, lagrange(gauss_lobatto(len(self.weights) - 1)[0], depths)
@@ -126,10 +123,7 @@ def layer_shares(scene: Any) -> dict[str, float]:
 
 
 def basis_of(scene: Any, materials: Any) -> ColumnBasis:
-    """Return the basis of the columns of a scene, whose first layer is at the bottom.
-
-    materials: {layer: `ThermalProperties`}, or one for all layers.
-    """
+    """Return the basis of a scene's columns, bottom layer first; materials: {layer: properties}, or one for all."""
     materials = materials if isinstance(materials, Mapping) else dict.fromkeys(scene.mesh.layers, materials)
     shares = layer_shares(scene)
     return ColumnBasis([*shares.values()], [materials[name] for name in shares], [*shares])

@@ -42,10 +42,7 @@ class ColumnTemperature:
         self._element: Any = basix.ufl.element("Lagrange", surface.domain.basix_cell().name, 1)
 
     def last_two_states(self, cells: np.ndarray, places: np.ndarray, layer: str) -> np.ndarray:
-        """Return temperatures at q places of cells and the points of a layer, now and before, within `limits`.
-
-        The shape is (1 or 2, cells, q, points).
-        """
+        """Return temperatures now and before, within `limits`, at places and layer, (1 or 2, cells, q, points)."""
         points, nodes = self.basis.layers[layer].points, self.sheet.cells(cells)
         shapes = np.asarray(self._element.tabulate(0, places)[0])
         states = [self.now] if self.before is None else [self.now, self.before]
