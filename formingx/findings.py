@@ -53,11 +53,7 @@ def coordinates(point: Iterable[float], digits: int = 4) -> str:
 
 
 class Check(Protocol[Subject]):
-    """Interface of a check: a function of its subject.
-
-    The subject is the body before a run (`formingx.checks.sizes.SizedBody`), the `Path` after a run, or a failed run
-    (`formingx.solve.diagnose.FailedRun`).
-    """
+    """Interface of a check: a function of a `SizedBody` before a run, of the `Path` after it, or of a `FailedRun`."""
 
     def __call__(self, subject: Subject, /) -> Iterable[Finding]:
         """Return or yield the findings on a subject; collective."""

@@ -1,7 +1,4 @@
-"""Limits to the number of points that come into contact in one step.
-
-If a whole region comes into contact in one step, the positions at which its points stick depend on the step length.
-"""
+"""Limits to the number of points that come into contact in one step."""
 
 from __future__ import annotations
 

@@ -1,15 +1,9 @@
-r"""Relaxing materials: an equilibrium energy and relaxing branches, each a spring in series with a damper.
+"""Relaxing materials: an equilibrium energy and relaxing branches, each a spring in series with a damper.
 
-A branch has a modulus mu, a relaxation time tau and a symmetric tensor as internal variable, Cv or A. Its stress
-derives from
-
-.. math:: W_{branch} = \frac{\mu}{2} \left[\mathrm{tr}(\bar C M) - 3\right], \qquad M = C_v^{-1} \text{ or } A,
-          \qquad \bar C = J^{-2/3} C
-
-with the isochoric right Cauchy-Green tensor :math:`\bar C`, which keeps the branches stress-free in the reference
-configuration. A step of length dt from a known state has a potential, whose derivative by F is the stress at the end of
-the step. The tangent is therefore symmetric and consistent, without iterations at a point. The potential is regular at
-dt = 0, where it is the elastic energy. For infinite dt the branch contributes nothing.
+The isochoric right Cauchy-Green tensor in the energy of a branch (`GeneralisedMaxwell`) keeps the branches stress-free
+in the reference configuration. A step of length dt from a known state has a potential, whose derivative by F is the
+stress at the end of the step. The tangent is therefore symmetric and consistent, without iterations at a point. The
+potential is regular at dt = 0, where it is the elastic energy. For infinite dt the branch contributes nothing.
 
 A symmetric tensor with one principal direction normal to the section is stored as its entries (11, 22, 12, 33).
 """

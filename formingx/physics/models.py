@@ -1,19 +1,9 @@
-r"""Models of a body: a solid with one of two treatments of incompressibility, or a membrane.
+"""Models of a body: a solid with one of two treatments of incompressibility, or a membrane.
 
-Both treatments derive from the penalty of Song (1993), eq. (3.4.1), here with the shear modulus mu of the layer as a
-factor, which makes epsilon dimensionless:
-
-.. math::
-    W + \frac{\mu}{\epsilon} (I_3 - 1)^2, \qquad \text{in (3.4.1):} \quad W + \frac{1}{\epsilon} (I_3 - 1)^2
-
-With the pressure p (positive in tension) as an unknown, the same penalty reads
-
-.. math::
-    W + p (J - 1) - \frac{p^2}{2 k}, \qquad k = \frac{8 \mu}{\epsilon}.
-
-Both are equal for small J - 1. The second needs far fewer Newton iterations, since its stress does not contain the
-volume error of an iterate times k. Models remove the isotropic stress of W in the reference configuration, see
-`formingx.materials.material`.
+Both treatments derive from the penalty of Song (1993), eq. (3.4.1), here with the shear modulus of the layer as a
+factor, which makes epsilon dimensionless. They are equal for small J - 1. `MixedPressure` needs far fewer Newton
+iterations, since its stress does not contain the volume error of an iterate times the bulk modulus 8 mu/epsilon. Models
+remove the isotropic stress of W in the reference configuration, see `formingx.materials.material`.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """Rigid tools with a profile of straight lines and circular arcs.
 
-The solid of a tool lies to the left of its profile, in the order of the points. A fillet is an arc, a sharp corner an
-arc of radius 0. So the profile is smooth between corners, and the distance to it is exact.
+A fillet is an arc, a sharp corner an arc of radius 0. So the profile is smooth between corners, and the distance to it
+is exact.
 """
 
 from __future__ import annotations

@@ -1,12 +1,8 @@
-r"""Factorised K-BKZ equation: the stress is an integral over all past states, with damping.
+"""Factorised K-BKZ equation: the stress is an integral over all past states, with damping.
 
-.. math:: \tau(t) = \int_{-\infty}^{t} m(t - t') \, h(I_1, I_2) \, B(t, t') \, dt', \qquad
-          m(s) = \sum_k \frac{G_k}{\tau_k} e^{-s/\tau_k},
-
-tau is the Kirchhoff stress up to a pressure, B(t, t') the Finger tensor of the deformation from t' to t. I1 = tr B and
-I2 = tr B^-1: Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner (1976)
-and Papanastasiou, Scriven and Macosko (1983). Without damping it is Lodge's (1956) network, `TransientNetwork`. In a
-scene its stress is computed at each quadrature point from the past states there (`past_states`).
+The equation is by Kaye (1962), Bernstein, Kearsley and Zapas (1963); factorised, without a term in B^-1, as by Wagner
+(1976) and Papanastasiou, Scriven and Macosko (1983). Without damping it is Lodge's (1956) network, `TransientNetwork`.
+In a scene its stress is computed at each quadrature point from the past states there (`past_states`).
 """
 
 from __future__ import annotations

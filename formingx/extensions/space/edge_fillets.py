@@ -1,8 +1,7 @@
 """Fillets of edges where the surfaces of two rigid solids meet.
 
-The signed distances are positive inside a tool. The common part of two solids has the smaller of both distances, and a
-convex edge. The union has the larger one, and a concave edge: it is the common part of the complements. A fillet is
-exact where the surfaces meet at right angles.
+The common part of two solids has the smaller of both signed distances, and a convex edge. The union has the larger one,
+and a concave edge. A fillet is exact where the surfaces meet at right angles.
 """
 
 from __future__ import annotations

@@ -1,19 +1,19 @@
-"""Sliding contact in three dimensions, with or without friction, in which points open and close only between steps.
+r"""Sliding contact in three dimensions, with or without friction, in which points open and close only between steps.
 
 Contact is lagged: a point whose gap closed in a step is in contact from the next step on. It then stays on the surface
 of the tool. Its traction per unit reference area is
 
-.. math:: t = k d n + T, \\qquad T = \\frac{\\mu N_0}{g_s} g, \\quad |g| \\le g_s,
+.. math:: t = k d n + T, \qquad T = \frac{\mu N_0}{g_s} g, \quad |g| \le g_s,
 
 with the penalty k, the coefficient of friction mu and the elastic slip g (Wriggers, Computational Contact Mechanics,
 2006, chapter 5.2). The signed distance d of the point from the tool is positive inside, and n = grad d. The slip is the
 slip of the last accepted state plus the motion since then in the present tangent plane. Return mapping limits it to
 g_s.
 
-The pressure N_0 is constant during the Newton iterations of a step, which therefore converge. At first N_0 is the
-pressure at the last accepted state, extrapolated along the tangent of the path. Then the step is solved again with the
-pressure that was found, until both agree (`LaggedLimits.max_pressure_difference`). N_0 is 0 for a point whose gap has
-closed since the last accepted state. Steps are short, so that the pressure changes little in each of them
+The pressure N_0 is constant during the Newton iterations of a step, which therefore converge. At first it belongs to
+the last accepted state, extrapolated along the path. Then the step is solved again with the pressure that was found,
+until both agree (`LaggedLimits.max_pressure_difference`). N_0 is 0 for a point whose gap has closed since the last
+accepted state. Steps are short, so that the pressure changes little in each of them
 (`LaggedLimits.max_pressure_change`).
 
 Within a step a point in contact carries tension as well as pressure, so that Newton's method meets no kink. Points in
@@ -51,8 +51,7 @@ class Distances(NamedTuple):
 class LaggedFriction(LaggedStick):
     """Contact law of points that slide on a tool in three dimensions, with lagged friction or without friction.
 
-    Friction is lagged: its limit mu N_0 is constant during a step. N_0 is the pressure at the last accepted state,
-    extrapolated along the path. The history variables (`ContactHistory`) of the n points at this state are:
+    The history variables (`ContactHistory`) of the n points at the last accepted state are:
 
     * `position`: positions, shape (n, 3), length.
     * `slip`: elastic slips as vectors, shape (n, 3), length.

@@ -1,8 +1,4 @@
-"""Limits of a step, and corrections after its solution, for contact with tools in three dimensions.
-
-Contact with these tools is lagged: the closed points, and the pressure that bounds their friction, belong to the last
-accepted state.
-"""
+"""Limits of a step, and corrections after its solution, for lagged contact with tools in three dimensions."""
 
 from __future__ import annotations
 

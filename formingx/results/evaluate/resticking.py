@@ -1,7 +1,4 @@
-"""Check of sticking contact points that separate from their tool and stick again elsewhere.
-
-The wall between such points depends on the step lengths.
-"""
+"""Check of sticking points that separate and stick elsewhere: the wall between them depends on the step lengths."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Animation of the forming: the section and the loading curve, in frames evenly spaced over the process.
-
-The loading curve of a stage is, for example, the force of a plug over its travel, or a pressure over the pole height.
-"""
+"""Animation of the forming: the section and the loading curve, in frames evenly spaced over the process."""
 
 import shutil
 import subprocess
