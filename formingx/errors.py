@@ -183,11 +183,7 @@ def as_points(name: str, values: Any, components: int = 2) -> np.ndarray:
 
 
 def values(name: str, function: Callable, arrays: Mapping[str, np.ndarray]) -> np.ndarray:
-    """Call a user's function of arrays, and return its values as floats, of the shape of the arrays.
-
-    The arrays are {name: array} in order. A failure, or a value that is not finite, is an InputError; one of the
-    function itself is passed on.
-    """
+    """Return a user's function of {name: array} as floats, shape of the arrays; failures and inf are an InputError."""
     arguments = ", ".join(arrays) if len(arrays) == 1 else f"({', '.join(arrays)})"
     try:
         found = np.broadcast_to(np.asarray(function(*arrays.values()), dtype=float),

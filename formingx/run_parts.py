@@ -88,11 +88,7 @@ def check_start(state: State, stages: list[Stage], problem: Problem) -> None:
 
 def new_path(curve: Curve, start: Path | State | None, columns: Mapping[str, Measure] | None, allow_inadmissible: bool,
              found: list[Finding], timed: bool = False) -> Path:
-    """Return a new path that begins with the states of `start`, a path or a state; None: without states.
-
-    columns: the argument `record` of `trace`. found: findings of the checks before the run, which are logged. timed:
-    True if the process time is a column.
-    """
+    """Return a new path from `start`, a path, state or None; columns: `record` of `trace`; found: findings, logged."""
     record = Record(curve.problem, curve)
     record.findings = found
     log_findings(found, curve.problem.comm.rank)

@@ -21,11 +21,7 @@ class Axes(Protocol):
 
 def figure(columns: int = 1, width: float = 5.5, height: float = 4.2, ratios: Any = None,
            rows: int = 1) -> tuple[Any, Any]:
-    """Return an empty matplotlib figure with `columns` x `rows` plots of a size in inches, and its axes.
-
-    The axes are in a list, row by row, or one. ratios: relative widths of the columns, default equal. Saving the figure
-    needs no screen.
-    """
+    """Return an empty figure of `rows` x `columns` plots, sizes in inches, and their axes or the only one."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     from .notebook import ShownAxes, ShownFigure

@@ -34,11 +34,7 @@ class History(Protocol):
         """Set the history variables to their values in the reference configuration."""
 
     def advance(self, x: np.ndarray, control: float, start: Start | None = None) -> None:
-        """Update the history variables to x, owned entries, shape (n,), at the end of a step.
-
-        The forms must be set to x. start: state at the beginning of the step; None for histories that do not depend on
-        it.
-        """
+        """Update to x, owned entries (n,), to which the forms are set; start: state at the beginning, or None."""
 
     def get(self) -> Any:
         """Return the current history variables, for `put`."""

@@ -23,11 +23,7 @@ _STRETCH_FRACTION = 0.97
 
 def write(material: Any, file: Any, temperatures: Sequence[float], rates: Sequence[float], unit: str,
           unit_of_time: str) -> Path:
-    """Write an HTML page with stress-stretch curves and the limits of a material, and return its path.
-
-    Curves are drawn at temperatures and Hencky rates, 1/time, with units in labels. Missing temperatures of a dependent
-    constant are an InputError.
-    """
+    """Write an HTML page of curves at temperatures and Hencky rates, and of limits, of a material; return its path."""
     caller, path = f"{material}: report", file_path("report: file", file)
     depends = [name for name, value in material.constants().items() if isinstance(value, OfTemperature)]
     values = as_list(f"{caller}: temperatures", temperatures, "temperatures")

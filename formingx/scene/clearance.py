@@ -72,11 +72,7 @@ def _break_points(plan: Any, travels: dict[int, float]) -> Iterator[dict[int, fl
 
 def _check_overlap(scene: Scene, caller: str, present: dict[int, Contact], outlines: dict[int, np.ndarray],
                    travels: dict[int, float]) -> None:
-    """Raise an InputError if two active tools overlap at given travels.
-
-    `present` are the contacts of the active tools, `outlines` points on the tools without travel and `travels` lengths,
-    each {number in `Scene.items`: value}. `caller` begins the error message.
-    """
+    """Raise an InputError, begun by `caller`, if active tools overlap at travels, {number in `Scene.items`: length}."""
     near = 1e-6 * max(scene.extent)
     for i, a in present.items():
         for j, b in present.items():

@@ -299,10 +299,7 @@ class Curve:
         return x, control
 
     def state_at_value(self, a: State, b: State, quantity: Quantity, target: float) -> State:
-        """Return the state of kind "target" between two states at which a quantity has a value in the user's units.
-
-        The value lies between those at `a` and `b`. Raise `Failure` if no such state was found.
-        """
+        """Return the "target" state from `a` to `b` where a quantity has a value in the user's units, or `Failure`."""
         low, high = 0.0, 1.0
         sign = self.value(quantity, a.x, a.control) - target
         for _ in range(40):

@@ -338,10 +338,7 @@ class Run:
         return new
 
     def _check_progress(self) -> None:
-        """Raise a `ConvergenceError` if the last states lead away from the target or came no nearer to it.
-
-        It is raised for an implausible value of the control, too.
-        """
+        """Raise a `ConvergenceError` if states lead away from the target or stall, or the control is implausible."""
         control = self.record.last.control
         reason = self.problem.description.implausible(control)
         if reason is not None:

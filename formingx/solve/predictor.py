@@ -25,10 +25,7 @@ def recent_states(states: Sequence[State], time: float, degree: int, close: floa
 
 
 def parabola_state(states: Sequence[State], length: float, distance: Callable[[State, State], float]) -> State | None:
-    """Return an earlier state for a parabola with the last state and its tangent; None if none is suitable.
-
-    It is one of the four before the last, at least half the step away, without a jump between them.
-    """
+    """Return one of the four states before, half a step away or more and no jump between, for a parabola; or None."""
     for before, after in zip(states[-2:-6:-1], states[:-6:-1]):
         if after.kind == "jump":
             return None

@@ -177,10 +177,7 @@ class Record:
             listener()
 
     def describe(self, state: State) -> str:
-        """Return the main output quantities of a state as one line of text.
-
-        Values that no body can have are left out, such as the pole stretch of a wall whose thickness is not positive.
-        """
+        """Return the main output quantities of a state as one line, without values that no body can have."""
         return f"stage {state.stage!r}, " * bool(state.stage) + ", ".join(
             f"{k.replace('_', ' ')} {state.measures[k]:.6g}" for k in self.curve.problem.description.main_columns
             if abs(state.measures.get(k, math.inf)) < 1e100)

@@ -316,11 +316,7 @@ def _columns(left: csv_files.CsvTable, right: csv_files.CsvTable, given: Any) ->
 
 
 def _independent(names: list[str], a: np.ndarray, b: np.ndarray, along: str | None) -> int | None:
-    """Return the number of the column at whose values the others are compared, or None to pair by arc length.
-
-    Our points have shape (n, c), theirs (l, c). An `along` that is no column, or not monotonic on both sides, is an
-    InputError.
-    """
+    """Return the column to compare at, None: by arc length; an `along` unknown or not monotonic is an InputError."""
     monotonic = [k for k in range(len(names)) if _is_monotonic(a[:, k]) and _is_monotonic(b[:, k])]
     if along is None:
         return min(monotonic, key=lambda k: _largest_slope(a, k), default=None)
@@ -361,11 +357,7 @@ def _difference(values: np.ndarray, size: float, partners: np.ndarray) -> Differ
 
 def _limit_points(table: csv_files.CsvTable, points: np.ndarray, names: list[str], control: str
                   ) -> list[dict[str, float]]:
-    """Return the limit points of a curve, each as {column: value}.
-
-    For a run they are its states of the kind "limit point", else vertices of parabolas through three points, (n, c),
-    where the control turns.
-    """
+    """Return limit points {column: value}: states of that kind, else vertices of parabolas where the control turns."""
     if table.kinds is not None and "start" in table.kinds:
         return [dict(zip(names, p.tolist())) for p, kind in zip(points, table.kinds) if kind == "limit point"]
     from scipy.signal import find_peaks

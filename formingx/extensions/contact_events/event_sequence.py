@@ -170,10 +170,7 @@ class ContactEventSequence:
         return self._work >= _SETTINGS.max_work
 
     def next(self, k: int, length: float) -> GapClosure | None:
-        """Return gap closure number k (from 0) on the path, along which points of earlier closures carry forces.
-
-        None if there is none within the arc length `length`, or if the prediction fails.
-        """
+        """Return gap closure k (from 0) on the path within an arc length, or None, as if the prediction fails."""
         while len(self._closures) <= k:
             if self.ends < np.inf or self.exhausted:
                 return None

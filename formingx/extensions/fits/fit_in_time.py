@@ -55,11 +55,7 @@ def fit_timed_tests(material: type[GeneralisedMaxwell] | GeneralisedMaxwell, tes
 
 
 def checked_tests(tests: Any, within: Any = None) -> list[Any]:
-    """Return tests in time and by oscillations as arrays, with nan for stresses at stretches outside `within`.
-
-    A constant stretch with a positive first time gets a point at time 0. Inconsistent tests, or none with a stress, are
-    an InputError.
-    """
+    """Return tests as arrays, nan outside `within`; a constant stretch starts at time 0; wrong tests: InputError."""
     found: list[Any] = []
     for i, test in enumerate(as_list("fit: data", tests, "TimedTest (a material that relaxes needs the time)"), 1):
         name = f"fit: data: number {i}"

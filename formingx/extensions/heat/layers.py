@@ -28,11 +28,7 @@ _SAMPLES = (1 - np.cos(np.pi * np.linspace(0.0, 1.0, 2001))) / 2
 
 
 def layered(mesh: Mesh, depths: Mapping[str, tuple[float, float]], moved: Callable | None = None) -> Mesh:
-    """Cut the elements of a mesh into thin layers below faces that exchange heat; collective.
-
-    `depths` are penetration depths at the first and last time, length, in positions `moved` (n, 2). Thin or curved
-    elements stay.
-    """
+    """Cut elements below faces into thin layers by depths of penetration, length, in positions `moved`; collective."""
     grid = gathered(mesh)
     cuts = _cuts(grid, depths, moved(grid.points) if moved else grid.points)
     try:

@@ -120,11 +120,7 @@ def without_pockets(edges: np.ndarray, touched: np.ndarray, depth: float) -> np.
 
 def refined_points(edges: np.ndarray, names: list[frozenset[str]],
                     touched: list[tuple[str, np.ndarray]]) -> np.ndarray:
-    """Return the points of the outline that get small elements, shape (k, 2), length.
-
-    These are the corners between two boundaries with contacts, and the ends of contact areas: `touched` has (boundary,
-    positions (n, 2)) of each contact.
-    """
+    """Return points (k, 2), length, for small elements: corners between contacts, and ends of areas `touched`."""
     faces = {on for on, _ in touched}
     found = []
     pressed, close = np.zeros(len(edges), dtype=bool), 1e-6 * np.ptp(edges[:, 0], axis=0).max()

@@ -35,11 +35,7 @@ def prepare_folder(folder: FilePath, task: Task, variables: list[str]) -> FilePa
 
 
 def read(folder: FilePath, variables: list[str]) -> list[StudyRun]:
-    """Return the runs stored in the folder of a study, one for each set of values, in the order of storing.
-
-    A run that failed by a fault of the script is repeated by the study; its second run replaces it. An unreadable file
-    is an InputError.
-    """
+    """Return stored runs in order, repeated ones (after a fault of the script) once; an unreadable file: InputError."""
     found: list[StudyRun] = []                                  # of runs with equal values the first final one counts
     for file in sorted(_files(folder)):
         try:

@@ -277,11 +277,7 @@ def _key_numbers(record: ReportData, units: Units) -> str:
 
 
 def _stages(record: ReportData, units: Units) -> str:
-    """Return an HTML table with a row per stage.
-
-    A row has the numbers of states and iterations, the controls at the end, the largest force on each tool, the largest
-    gap in a corner at the end, and the smallest wall over original thickness at the end.
-    """
+    """Return an HTML table of stages: states, iterations, final controls, largest forces and gap, smallest wall."""
     columns = [c for end in CONTROLS for c in record.measures if c.endswith(end)]
     columns += ["process_time"] * record.timed
     rows, extra = [], [units.label("force", f"largest force on {name}") for name in record.forces]
