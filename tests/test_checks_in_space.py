@@ -5,7 +5,7 @@ import re
 
 import numpy as np
 import pytest
-from test_space import disc
+from test_space import disc, plug_above
 
 import formingx as fx
 
@@ -93,3 +93,17 @@ def test_triangles_too_large_for_a_sheet(size, error, words):
     assert abs(pressure / 0.0482505 - 1) == pytest.approx(error, rel=0.05)
     found = str(fx.check(scene, units=fx.Units(length="mm")))
     assert re.search(words or "no fault was found", found)
+
+
+IN, OUT = (fx.Stage(name, control="plug", until=fx.travel(travel)) for name, travel in (("in", 0.5), ("out", 0.0)))
+
+
+@pytest.mark.parametrize("separates, stages, found", [
+    (None, [IN, OUT], True), (True, [IN, OUT], False), (None, [IN], False),
+    (None, [IN, fx.Stage("out", inactive=["plug"])], False),
+    (None, [fx.Stage("in", amplitudes={"plug": [(0.0, 0.0), (1.0, 0.5), (2.0, 0.2)]})], True)])
+def test_a_plug_that_takes_the_sheet_along_is_reported(separates, stages, found):
+    """By default a sheet that sticks does not separate in three dimensions."""
+    scene = disc(contacts=[plug_above(separates)], model=fx.Membrane(wrinkles=0.01))
+    texts = [finding.text for finding in fx.check(scene, stages=stages).findings]
+    assert any("'plug' moves back and takes the sheet along" in text for text in texts) == found

@@ -10,8 +10,10 @@ from ...contact import resultants
 from ...errors import InputError
 from ...findings import Finding, coordinates, percent, register
 from ...mesh.nodes import nearest
+from ...physics.contact import Contact
 from ...physics.supports import Symmetry
 from ...ranks import combined, gathered
+from ...solve.stage import plan
 from ...values.tolerances import NEGLIGIBLE
 from .lagged_steps import LAGGED
 from .passed_tools import PassedTool
@@ -112,6 +114,24 @@ def unbalanced_loads(path: Any) -> Iterator[Finding]:
         yield Finding("warning", "forces", f"the forces on supports and tools miss the resultant of the loads by"
                       f" {percent(share)} in the last state: do not use a force. Use smaller triangles where the sheet"
                       f" slides on fillets, or adapt_mesh=True.")
+
+
+@register("start")
+def sheets_pulled_along(body: Any) -> Iterator[Finding]:
+    """Yield a finding for a stage in which a tool moves back with the sheet, which sticks to it and cannot separate."""
+    travels: dict[int, float] = {}                           # at the end of the last stage, by number of the tool
+    for step in [plan(body.scene, stage) for stage in body.stages]:
+        until, ends = step.stage.until, {i: table[:, 1] for i, table in step.tables}
+        if step.numbers and until is not None and until.name.endswith("travel"):
+            ends[step.numbers[0]] = np.array([until.value])
+        for i, values in ends.items():
+            tool, way = body.scene.items[i], np.append(travels.get(i, 0.0), values)
+            travels[i] = float(way[-1])
+            back = np.any(np.diff(np.maximum(way, 0.0)) < 0)
+            if isinstance(tool, Contact) and tool.lagged and not tool.separates and back and i not in step.inactive:
+                yield Finding("warning", step.stage.label, f"{tool.label!r} moves back and takes the sheet along, which"
+                              f" sticks to it: leave the tool out of the stage, inactive=[{tool.label!r}], or use"
+                              f" Contact(..., separates=True), if the sheet does not relax")
 
 
 @register("start")
