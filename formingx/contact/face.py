@@ -81,10 +81,7 @@ class Increment:
         self._last_positions = b""
 
     def tractions(self, x: np.ndarray) -> Tractions:
-        """Return the tractions at positions x, shape (n, c), length: of the law or, after `linearise(x)`, linearised.
-
-        They are stored for repeated calls with the same positions.
-        """
+        """Return the tractions at x (n, c), length, of the law, or linearised after `linearise(x)`, stored."""
         positions = x.tobytes()
         if self.last is None or positions != self._last_positions:
             self._last_x, self._last_positions, self.last = x, positions, self._law.tractions(x, self._history)

@@ -76,10 +76,7 @@ class _LoadedWhenUsed(types.ModuleType):
 
 
 def tools(axes: Any, placed: Any, low: Any, high: Any, mirror: bool = False) -> None:
-    """Draw the sections of rigid tools in grey, within a box from `low` to `high`, (r, z), length.
-
-    placed: (`Tool`, its displacement (r, z), length) of each. mirror: with their images at r = 0, too.
-    """
+    """Draw sections of `placed` tools (`Tool`, displacement) in grey within a box (r, z), length, or also mirrored."""
     box = np.array([low, high], dtype=float)
     n = np.maximum(300 * (box[1] - box[0]) / np.max(box[1] - box[0]), 40).astype(int)
     r, z = (np.linspace(box[0, k], box[1, k], n[k]) for k in (0, 1))

@@ -9,10 +9,7 @@ from . import tools as draw_tools
 
 
 def draw_volume_ratios(elements: Any, marks: list, tools: list, title: str, file: Any) -> None:
-    """Write a picture of deformed elements, coloured by the volume ratio J, with marked points and tools.
-
-    marks: (label, deformed position); tools: (tool, its displacement). The ending of `file` is the format.
-    """
+    """Write deformed elements coloured by J, with `marks` (label, position) and `tools` (tool, displacement)."""
     from matplotlib.collections import PolyCollection
     size = np.ptp(elements.outline, axis=(0, 1))
     wide = size[0] > 4 * size[1]

@@ -109,10 +109,7 @@ class Probe:
 
 
 class MidSurfaceProbe(Probe):
-    """Evaluation of the displacement of a membrane at fixed reference points through its thickness.
-
-    Points stay on the normal of their mid-surface point, at distances in proportion to the thickness.
-    """
+    """Displacement of a membrane at points on normals of its mid-surface, whose distances scale with the thickness."""
 
     def __init__(self, problem: Any, points: np.ndarray):
         super().__init__(problem, points)

@@ -130,13 +130,11 @@ def transfer_histories(source: Any, state: Any, problem: Any, x: np.ndarray, con
 
 def fitted_tensors(interpolation: MovingLeastSquares, values: np.ndarray, source_F: np.ndarray,
                    target_F: np.ndarray) -> np.ndarray:
-    r"""Interpolate symmetric positive definite tensors C, entries 11, 22, 12, 33, to other points; collective.
+    r"""Interpolate symmetric positive definite C, entries 11, 22, 12, 33, from (m, 4) to (n, 4); collective.
 
     The interpolated quantity is the logarithm relative to the current configuration, so stresses stay continuous:
 
     .. math:: \ln(F^{-T} C F^{-1})
-
-    values: shape (m, 4); source_F, target_F: shape (m, 3, 3) and (n, 3, 3). The result has the shape (n, 4).
     """
     seen = np.linalg.solve(np.swapaxes(source_F, 1, 2), _matrices(values))
     w, v = np.linalg.eigh(np.swapaxes(np.linalg.solve(np.swapaxes(source_F, 1, 2), np.swapaxes(seen, 1, 2)), 1, 2))

@@ -27,10 +27,7 @@ class Peak(NamedTuple):
 
 
 class FreeInflation:
-    """Free inflation of a thin tube or disc of incompressible layers.
-
-    Layers: (material with constant numbers, reference thickness, length); radius: of the tube or the opening.
-    """
+    """Free inflation of a thin tube or disc, of a radius, of layers (material, reference thickness), in length."""
 
     def __init__(self, layers: Sequence[tuple[Material, float]], radius: float):
         self._layers = [(material, list(material.parameters.values()), h) for material, h in layers]

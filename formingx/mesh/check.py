@@ -63,10 +63,7 @@ def connected_pieces(triangles: np.ndarray) -> np.ndarray:
 
 
 def _check_middles(points: np.ndarray, triangles: np.ndarray, what: str) -> None:
-    """Raise an InputError unless each edge has one mid-edge node, no corner and of no other edge.
-
-    Nodes have shape (n, 2), length, triangles (m, 3 or 6); three nodes pass.
-    """
+    """Raise an InputError unless each edge of triangles (m, 6) has its own mid-edge node in points (n, 2), length."""
     if triangles.shape[1] != 6:
         return
     rows = np.concatenate([np.column_stack([np.sort(triangles[:, [i, j]], axis=1), triangles[:, k]])

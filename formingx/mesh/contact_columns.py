@@ -90,10 +90,7 @@ is hardly stretched there and needs no more elements through it."""
 
 
 def for_contacts(mesh: Mesh, contacts: Sequence[Any], axisymmetric: bool, keep_through: bool = False) -> Mesh:
-    """Return a mesh of the same body with short columns of elements at the fillets of its tools.
-
-    The mesh itself is returned if the script gave its elements, if it was deformed, or if it is no thin sheet.
-    """
+    """Return a mesh with short columns at fillets of tools, or a thick, deformed or user-divided one as it is."""
     preset, columns = mesh.preset, mesh.columns
     if preset is None or columns is None or not contacts or moved_nodes(mesh) > 1e-9:
         return mesh

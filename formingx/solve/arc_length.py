@@ -318,9 +318,9 @@ class Curve:
     def limit_point(self, a: State, b: State) -> State:
         """Return the state of kind "limit point" between two states at which the control is stationary.
 
-        The Hermite cubic gives the guess, and each state found replaces an end. This is repeated until the control is
-        within 1e-12 of its extremum, relative, as estimated from slope and curvature. Where the path is curved so much
-        that the cubic does not come within 1e-6, the ends are halved in every second step.
+        The Hermite cubic gives the guess, and each state found replaces an end, until the control is within 1e-12 of
+        its extremum, as estimated from slope and curvature. Where the cubic does not come within 1e-6, the ends are
+        halved in every second step.
         """
         for k in range(3 * _BY_CUBIC):
             chord = self.distance(a, b)

@@ -48,10 +48,7 @@ _LARGEST_ROUND_OFF = 1e-10
 
 
 class PerturbedRunFailure(Failure):
-    """Failure to find a state of a perturbed run near the state of the base run.
-
-    The change of the parameter moves contact points by more than the distance over which contact pressure begins.
-    """
+    """Failure to find a perturbed state: the parameter moves points by more than the reach of contact pressure."""
 
 
 class _Start(NamedTuple):

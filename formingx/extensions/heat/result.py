@@ -338,10 +338,7 @@ class HeatRun:
                          f" {', '.join(map(repr, self.mesh.boundaries))}: give its ends as line=((R, Z), (R, Z))")
 
     def _state_at(self, time: float | None) -> list[np.ndarray]:
-        """Return the temperatures of body and tools at a time, as an entry of `states`; None: the end of the run.
-
-        Hermite's cubic with slopes of parabolas is used in between. A time outside the run is an InputError.
-        """
+        """Return the temperatures at a time, None: the end, by Hermite's cubic; outside the run: InputError."""
         times = self._times
         t = times[-1] if time is None else finite("time", time)
         near = 1e-12 * times[-1]
@@ -358,10 +355,7 @@ class HeatRun:
                 for va, vb, da, db in zip(a, b, slope_a, slope_b)]
 
     def _slope(self, k: int) -> list[np.ndarray]:
-        """Return the time derivatives of the temperatures in state k, degrees per time, with the shapes of `states[k]`.
-
-        They are slopes of the parabola through the nearest three states, or of the chord of two.
-        """
+        """Return time derivatives in state k, degrees per time, of the parabola of three states or the chord of two."""
         i = min(max(k, 1), len(self._times) - 2)
         if i < 1:
             return [(b - a) / (self._times[1] - self._times[0]) for a, b in zip(*self.states[:2])]

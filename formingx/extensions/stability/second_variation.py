@@ -354,10 +354,7 @@ class SecondVariation:
         return self._unknowns[guided], values
 
     def _unknowns_of(self, mode: Any) -> np.ndarray:
-        """Return a rigid motion as a mode, locally owned entries, shape (n,).
-
-        mode: function from deformed positions (k, 2), length, to radial, axial and hoop amplitudes, (k, 3).
-        """
+        """Return a rigid motion, a function of positions (k, 2) to amplitudes (k, 3), as a mode (n,), owned entries."""
         forms, fields = self._forms, self.problem.x.array_r
         u = forms.length * fields[self._old]
         values = mode(self._X + u) / forms.length

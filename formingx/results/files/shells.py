@@ -40,10 +40,7 @@ def shells(profile: Any, parts: int) -> tuple[np.ndarray, np.ndarray, np.ndarray
 
 
 def to_inp(profile: Any, parts: int, file: Any, comm: Any) -> None:
-    """Write an axisymmetric sheet as shell elements for CalculiX or Abaqus (`Path.to_inp`; rank 0 writes).
-
-    It has nodes, elements, wall, and the set of nodes at the rim. Another ending is an InputError.
-    """
+    """Write an axisymmetric sheet as shells with walls and rim for CalculiX or Abaqus (`Path.to_inp`) on rank 0."""
     file = tabular.named("to_inp", file, ".inp")
     points, walls, tips, quads = shells(profile, parts)
     lines = ["*HEADING", "formingx: middle surface of a formed part, turned about z; its walls as thickness",
