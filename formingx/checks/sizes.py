@@ -16,7 +16,7 @@ from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
 from ..scene.contact_checks import OTHER_UNIT
 from ..scene.scene import Scene
-from ..solve.stage import Stage
+from ..solve.stage import Plan, Stage, plan
 from ..tools.shapes import Tool
 from ..units import Units
 from .mould_side import free_distance, outward_directions
@@ -86,6 +86,14 @@ class SizedBody(Triangles):
                 value = float(table[np.argmax(np.abs(table[:, 1])), 1])
                 self.prescribed.append(
                     PrescribedValue(item, str(item.quantity), value, f"the table of {name!r} in {stage.label}"))
+
+    @cached_property
+    def plans(self) -> list[Plan]:
+        """Stages with the numbers of their loads, supports and tools; [] if a stage is refused, which `check` says."""
+        try:
+            return [plan(self.scene, stage) for stage in self.stages]
+        except InputError:
+            return []
 
     def format(self, value: float, kind: str, digits: int = 4) -> str:
         """Return a number with its unit, such as "0.25 MPa", for a "pressure", "travel", "force" or "stress"."""

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 from ..findings import Finding, register
 from ..physics.contact import Contact
-from ..solve.stage import Plan, plan
+from ..solve.stage import Plan
 from .sizes import SizedBody
 
 
@@ -21,7 +21,7 @@ def peeling(body: SizedBody) -> Iterator[Finding]:
     if not any(material.internal or material.integral for material in scene.materials.values()):
         return
     pressed: set[int] = set()                                # numbers of the loads with a pressure at the time
-    for step in [plan(scene, stage) for stage in body.stages]:
+    for step in body.plans:
         before, pressed = pressed, pressed | set(_pressures(step, body))
         pressed -= {i for i, value in _pressures(step, body).items() if value == 0} | set(step.inactive)
         moulds = [item for i, item in enumerate(scene.items) if isinstance(item, Contact) and item.direction is None

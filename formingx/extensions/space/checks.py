@@ -13,7 +13,6 @@ from ...mesh.nodes import nearest
 from ...physics.contact import Contact
 from ...physics.supports import Symmetry
 from ...ranks import combined, gathered
-from ...solve.stage import plan
 from ...values.tolerances import NEGLIGIBLE
 from .lagged_steps import LAGGED
 from .passed_tools import PassedTool
@@ -120,7 +119,7 @@ def unbalanced_loads(path: Any) -> Iterator[Finding]:
 def sheets_pulled_along(body: Any) -> Iterator[Finding]:
     """Yield a finding for a stage in which a tool moves back with the sheet, which sticks to it and cannot separate."""
     travels: dict[int, float] = {}                           # at the end of the last stage, by number of the tool
-    for step in [plan(body.scene, stage) for stage in body.stages]:
+    for step in body.plans:
         until, ends = step.stage.until, {i: table[:, 1] for i, table in step.tables}
         if step.numbers and until is not None and until.name.endswith("travel"):
             ends[step.numbers[0]] = np.array([until.value])
