@@ -4,8 +4,10 @@ import json
 
 import numpy as np
 import pytest
+from mpi4py import MPI
 
 import formingx as fx
+from formingx.extensions.space.wall import SheetWall, thinnest_triangle
 from formingx.io.stl import volume
 from formingx.results.files import checkpoint_data
 from formingx.results.show import report_data
@@ -43,8 +45,21 @@ def test_part_of_a_sheet_in_space_gives_results_of_the_whole(parts, part, factor
     assert [path.last.measures[c] for c in COLUMNS] == pytest.approx([whole.last.measures[c] for c in COLUMNS],
                                                                      rel=1e-5)
     assert path.last.measures["penetration"] < 1e-5 and whole.last.measures["penetration"] < 1e-5       # of the wall
+    assert mine.min_wall_at == pytest.approx(its.min_wall_at, rel=1e-4)
     assert path.tool_forces()["mould"][-1] == path.last.measures["mould_force"]
     assert f"(a {part} was modelled)" in str(mine) and "given for" not in str(its)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_thinnest_triangle_of_mirror_images_does_not_depend_on_round_off(seed):
+    """Of four images the one at positive x and y; a share of 0 leaves a triangle out."""
+    rest = np.array([[0.0, 0, 0], [2, 0, 0], [0, 1, 0], [-2, 0, 0], [0, -1, 0]])
+    fans = np.array([[0, 1, 2], [0, 2, 3], [0, 3, 4], [0, 4, 1]])
+    deformed = rest * 1.5 + 1e-13 * np.random.default_rng(seed).normal(size=rest.shape)
+    wall = SheetWall(rest, deformed, fans, {"sheet": np.ones(4)}, MPI.COMM_SELF)
+    assert thinnest_triangle(wall) == 0 and thinnest_triangle(wall, np.array([0, 1, 1, 1])) == 3
+    thinner = SheetWall(rest, deformed, fans, {"sheet": np.array([1, 1, 0.999, 1])}, MPI.COMM_SELF)
+    assert thinnest_triangle(thinner) == 2
 
 
 def test_contact_area_is_that_of_the_deformed_sheet(parts):

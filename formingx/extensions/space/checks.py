@@ -19,7 +19,7 @@ from .passed_tools import PassedTool
 from .solid_tool import Swept
 from .stress import stress_of
 from .surface import smaller_stress
-from .wall import nearest_triangles
+from .wall import nearest_triangles, thinnest_triangle
 
 _UNBALANCED = 0.02         # share of the resultant of the loads that supports and tools may miss
 
@@ -56,7 +56,7 @@ def error_of_minimum_wall(path: Any) -> Iterator[Finding]:
     if scene.kinematics.components != 3 or not scene.contacts:
         return
     wall = path.wall()
-    k = int(np.argmin(wall.wall))
+    k = thinnest_triangle(wall)
     error = wall.error_of(k)
     if error > _LARGE_WALL_ERROR * wall.wall[k]:
         place = coordinates(wall.middle[k])

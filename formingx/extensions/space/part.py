@@ -15,7 +15,7 @@ from ...scene.symmetry import MirrorPlanes
 from ...units import NONE, Units
 from .sheet import chords, outline_edges
 from .union import Union
-from .wall import SheetWall
+from .wall import SheetWall, thinnest_triangle
 
 
 @dataclass(frozen=True, repr=False)
@@ -87,7 +87,7 @@ def part(wall: SheetWall, density: float | None, trim: Any, heights: Any, units:
     kept = share > 0
     h, area, rest = wall.wall[kept], (wall.area * share)[kept], (wall.reference_area * share)[kept]
     volume, images = float((h * area).sum()), planes.factor
-    mean, k = volume / area.sum(), int(np.flatnonzero(kept)[np.argmin(h)])
+    mean, k = volume / area.sum(), thinnest_triangle(wall, share)
     whole = float((wall.wall * wall.area).sum())
     weight = None if density is None else units.mass(images * volume, positive("part: density", density))
     return SheetPart(images * volume, images * float(area.sum()), float(area.sum() / rest.sum()), mean,

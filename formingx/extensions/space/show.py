@@ -22,7 +22,7 @@ from ...results.show.report_data import of_path, words
 from ...results.show.views import camera_direction, look, plotted, shading
 from ...scene.summary import summary
 from ...units import Units
-from .wall import wall_of
+from .wall import thinnest_triangle, wall_of
 
 _DRAWN, _FRAMES = 200_000, (10, 100)
 """Largest number of nodes of all drawn states of a report together; smallest and largest number of drawn states."""
@@ -209,7 +209,7 @@ def _parts_of_tools(path: Any, states: list[Any], units: Units) -> str:
 
 def _cut(wall: Any, units: Units) -> list[dict[str, Any]]:
     """Return two charts, shape and wall, of the cut through the thinnest triangle along the longer side of the part."""
-    thinnest = wall.middle[int(np.argmin(wall.wall))]
+    thinnest = wall.middle[thinnest_triangle(wall)]
     axis = int(np.argmax(np.ptp(wall.deformed_points[:, :2], axis=0)))
     normal = np.eye(3)[1 - axis]
     cut = wall.section(tuple(thinnest), tuple(normal))
@@ -247,7 +247,7 @@ def _mesh(path: Any, record: Any, units: Units) -> dict[str, Any]:
         images = [[*scale, *shift] for scale, shift in record.planes.images(3, contact.tool.bounds)]
         tools.append({"name": name, "points": rounded(points.T), "triangles": triangles.T.tolist(), "images": images,
                       "moves": contact.travel_vector.tolist(), "travel": [record.travels[i][k] for i in record.frames]})
-    thinnest = [int(np.argmin(wall.wall)) for wall in walls]
+    thinnest = [thinnest_triangle(wall) for wall in walls]
     return {"thinnest": [rounded([*wall.middle[k], wall.wall[k]], each=True) for wall, k in zip(walls, thinnest)],
             "triangles": walls[0].triangles.T.tolist(), "points": [rounded(wall.deformed_points.T) for wall in walls],
             "fields": {name: [rounded(values) for values in each] for name, each in shown.items()}, "tools": tools}

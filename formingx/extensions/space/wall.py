@@ -20,6 +20,7 @@ from ...results.files.column_table import ColumnTable
 from .surface import wrinkled
 from .surface_mesh import below, closest_points, volume_within
 
+_EQUAL_WALLS = 1e-6                                          # relative difference of walls of mirror images
 
 @dataclass(frozen=True, repr=False)
 class SheetWall(ColumnTable):
@@ -430,6 +431,17 @@ def wall_of(path: Any, state: Any) -> SheetWall:
     _, first, row = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     layers = {name: gathered(comm, values)[order] for name, values in h.items()}
     return SheetWall(rest[first], moved[first], row.reshape(-1, 3), layers, comm, problem.scene.symmetry_factor)
+
+
+def thinnest_triangle(wall: SheetWall, share: np.ndarray | None = None) -> int:
+    """Return the number of the thinnest triangle, of those with a positive share, shape (m,), if given.
+
+    Of mirror images, which round-off tells apart, it is the one with the largest x, then y, then z.
+    """
+    h = np.where(True if share is None else share > 0, wall.wall, np.inf)
+    equal = np.flatnonzero(h <= h.min() * (1 + _EQUAL_WALLS))
+    places = np.round(wall.middle[equal] / np.ptp(wall.deformed_points), 6)
+    return int(equal[np.lexsort(places.T[::-1])[-1]])
 
 
 def nearest_triangles(wall: SheetWall, position: np.ndarray) -> tuple[int, np.ndarray]:
