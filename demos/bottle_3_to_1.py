@@ -41,7 +41,7 @@ def section(axes, profile, side, colour):
 def main():
     options = parser("bottle_3_to_1", __doc__, elements=60, layers=2)
     args = options.parse_args()
-    elements = (30, 1) if args.quick else (args.elements, args.layers)
+    elements = (36, 1) if args.quick else (args.elements, args.layers)
     summary = {}
     figure, (sections, walls, pressures) = figures.figure(3, width=4.0)
     for k, name in enumerate(MATERIALS):
