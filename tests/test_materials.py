@@ -12,6 +12,7 @@ from scipy.optimize import brentq
 from ufl.algorithms import expand_derivatives, expand_indices
 
 import formingx as fx
+from formingx.materials import homogeneous
 from formingx.materials.homogeneous import MODES, _Program
 from formingx.physics import kinematics
 from formingx.problem.problem import Problem
@@ -60,6 +61,17 @@ CASES = [
 ]
 MATERIAL = pytest.mark.parametrize("material, exact", CASES, ids=lambda x: type(x).__name__ if x in
                                    [m for m, _ in CASES] else "")
+
+
+def test_materials_of_a_kind_differentiate_their_energy_once():
+    """Whatever the constants are: a study makes hundreds of materials."""
+    def made(c):
+        return fx.MooneyRivlin(c10=c, c01=0.1), fx.Ogden(mu=[c, 0.01], alpha=[1.8, 6.0])
+    made(0.3)
+    before = homogeneous._programs.cache_info().misses
+    made(0.4)
+    assert homogeneous._programs.cache_info().misses == before
+
 
 
 @pytest.mark.quick

@@ -45,7 +45,8 @@ class Response:
         W = ufl.as_ufl(energy(F, **dict(zip(names, _CONSTANTS))))
         if W.ufl_shape != ():
             raise InputError(f"a strain energy must be a scalar, this one has the shape {W.ufl_shape}")
-        self._first, self._all = _programs(W, len(names))
+        # without names of indices, the energies of two materials of a kind are equal
+        self._first, self._all = _programs(expand_indices(expand_derivatives(W)), len(names))
 
     @np.errstate(all="ignore")
     def stress(self, stretches: Any, constants: Any) -> np.ndarray:
@@ -233,7 +234,6 @@ def _programs(W: Any, n: int) -> tuple[_Program, _Program]:
     They have 3 and 9 outputs (11, 12, 13, 22, 23, 33 last). W depends on `_STRETCHES` and n `_CONSTANTS`.
     """
     inputs = [*(x.ufl_operands[0] for x in _STRETCHES), *_CONSTANTS[:n]]
-    W = expand_indices(expand_derivatives(W))
     first = [expand_derivatives(ufl.diff(W, x)) for x in _STRETCHES]
     second = [expand_derivatives(ufl.diff(first[i], _STRETCHES[j])) for i in range(3) for j in range(i, 3)]
     return _Program(inputs, first), _Program(inputs, first + second)
