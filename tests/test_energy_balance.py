@@ -227,6 +227,16 @@ def test_long_steps_are_halved(name):
     assert np.abs(work["unbalanced"]).max() < 5e-3 * size
 
 
+def test_a_step_from_a_flat_membrane_is_halved():
+    """The tangent of a flat sheet is long: in the plane normal to it, half-way, the body is inflated further."""
+    sheet = fx.mesh.sheet(fx.mesh.rectangle(160, 100, corner=20), size=20)
+    scene = fx.Scene(mesh=sheet, thickness=1.0, materials=fx.NeoHookean(c10=0.05), loads=[fx.Pressure("top")],
+                     supports=[fx.SimplySupported("rim")])
+    path = fx.trace(scene, until=fx.pressure(1e-3), progress=False)
+    work = path.work()
+    assert len(path) == 2 and work["pressure"][-1] == pytest.approx(work["strain_energy"][-1], rel=1e-3)
+
+
 def test_step_control_of_a_process_reaches_its_flows():
     stage = Stage("flow", control="air", amplitudes={fx.enclosed_volume: [(0, 0), (1.0, 0.5)]})
     assert len(run(sheet(RELAXES), stage, step=fx.StepControl(length=0.02, largest=0.02))) > 50

@@ -119,6 +119,8 @@ class EnergyBalance:
                     continue
                 finally:
                     curve.spent()
+                if max(curve.distance(a, found), curve.distance(found, b)) >= h:
+                    continue                                # beyond an end of the step
                 problem.history.advance(found.x, found.control)
                 found.history_variables, found.setting = problem.history.variables, b.setting
                 return found
