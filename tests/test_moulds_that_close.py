@@ -41,6 +41,15 @@ def test_edge_of_an_intersection_of_normal_planes_is_an_exact_fillet():
     assert edge.signed_distance(away) == pytest.approx(0 * angle - 0.5, abs=1e-12)
 
 
+BALL = fx.tools.revolved(fx.tools.sphere(radius=5.0))
+
+
+@pytest.mark.parametrize("apart", [fx.tools.intersection(BALL, BALL.moved(x=11.0)), fx.tools.half(BALL, position=6.0)])
+def test_an_intersection_without_a_surface_is_refused(apart):
+    with pytest.raises(fx.InputError, match="has no surface: the surface of neither tool lies in"):
+        apart.surface()
+
+
 def side(along):
     """The section of the bottle's body, extruded along an axis."""
     line = [(0, -16), (10, -16), (35, -46), (35, -180), (0, -180)]

@@ -93,6 +93,9 @@ class Intersection(SolidTool):
             n += 3 * len(corners)
         if not points:
             raise InputError(f"{self!r}: has no surface: both tools are half spaces")
+        if not n:
+            raise InputError(f"{self!r}: has no surface: the surface of neither tool lies in the solid of the other."
+                             f" Are both at their places, in the same unit of length?")
         return merged(np.vstack(points), np.vstack(triangles))
 
     def __repr__(self) -> str:
