@@ -243,6 +243,20 @@ def test_walls_of_a_rough_cup():
         assert mean == pytest.approx(should, rel=0.01)
 
 
+def test_much_friction_in_a_groove_has_one_force():
+    """Pressure and friction alternate unless corrections are halved; the force would depend on the steps."""
+    groove = fx.tools.revolved(fx.Tool([(0, 0), (0.16, 0), (0.28, 0.1), (0.44, 0), (0.6, 0.2), (0.6, 0.6)],
+                                       [0, 0.04, 0.04, 0.04, 0.04, 0]))
+    sheet = fx.mesh.sheet(fx.mesh.circle(1.0, part="quarter"), size=0.24)
+    scene = fx.Scene(mesh=sheet, thickness=0.02, materials=MATERIAL, supports=HELD, contacts=[
+        fx.Contact("top", groove, 2.0, direction=(0, 0, -1), name="plug")])
+    paths = [fx.trace(scene, until=fx.travel(0.28), intermediate=given, progress=False)
+             for given in ([], [fx.travel(0.278)])]
+    forces = [path["plug_force"] for path in paths]
+    assert forces[0][-1] == pytest.approx(forces[1][-1], rel=1e-3)
+    assert all(np.diff(force).min() > 0 for force in forces)
+
+
 @pytest.mark.thorough
 def test_no_point_jumps_over_a_lip_in_a_default_step():
     """A lip is half as wide as a triangle: walls agree with those of short steps to 3 %, triangle by triangle.

@@ -442,6 +442,24 @@ def test_a_target_whose_second_solution_fails_keeps_the_first(monkeypatch):
     assert np.abs(kept / renewed - 1).max() > 0.02
 
 
+def test_a_target_whose_pressures_diverge_keeps_the_first_solution(monkeypatch):
+    """If the difference of the pressures grows from one solution to the next, the state is the one before them."""
+    def run():
+        path = fx.trace(trough(0.1, friction="none"), until=fx.pressure(0.4), progress=False)
+        return path.wall().ratio
+    renew, differences = LaggedCorrections.renew, []
+
+    def grow(limit, new):
+        differences.append(0.1 * 1.1 ** len(differences))
+        return renew(limit, new) or True
+    monkeypatch.setattr(LaggedCorrections, "renew", grow)
+    monkeypatch.setattr(LaggedCorrections, "_difference", lambda limit: differences[-1])
+    kept = run()
+    monkeypatch.setattr(LaggedCorrections, "renew", lambda limit, new: False)
+    np.testing.assert_array_equal(kept, run())
+    assert len(differences) > 10
+
+
 @pytest.mark.thorough
 def test_an_adapted_trough_without_friction():
     """The wall in the fillet is exact to 1 %, with fewer triangles than an even mesh whose error is 1.3 %."""

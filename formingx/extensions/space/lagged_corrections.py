@@ -45,15 +45,25 @@ class LaggedCorrections:
         """Put points that penetrate a tool into contact where they met it, and solve again for the end of a step.
 
         At a target (`equation`) all tools count and pressures are renewed: without friction the state is then
-        independent of earlier steps; if this fails, the solution before is returned. Elsewhere tools with friction
+        independent of earlier steps; if this fails, the solution before is returned. If pressure and friction increase
+        each other, as in a groove with much friction, it is the one before all renewals. Elsewhere tools with friction
         count, and the control stays. Raise `Failure` without a state.
         """
-        constraint = equation or fixed(new.control)
+        constraint, first = equation or fixed(new.control), None
         for sweep in range(LAGGED.max_solutions):
             late = any([c.correct(new.x[:self._n], new.control, equation is not None, sweep) for c in self._contacts])
             variables = curve.problem.history.variables
-            if not late and (equation is None or sweep > LAGGED.max_solutions / 2 or not self.renew(new)):
-                return new
+            if not late:
+                if equation is None or not self.renew(new):
+                    return new
+                first = first or (new, variables, self._difference())
+                if sweep > LAGGED.max_solutions / 2:
+                    if self._difference() >= first[-1]:
+                        log.info("the contact pressure at %s stays that of the first solution: from one solution to the"
+                                 " next it changes more and more", new.target)
+                        new, variables, _ = first
+                    curve.problem.history.variables = variables
+                    return new
             try:
                 new = curve.solve_again(new, constraint, old)
             except Failure as failure:
@@ -63,6 +73,10 @@ class LaggedCorrections:
                 curve.problem.history.variables = variables
                 return new
         raise Failure("points that come into contact late bring others into their tool again and again", [])
+
+    def _difference(self) -> float:
+        """Return the largest relative difference of the pressures that `renew` found last; 0 where the sheet sticks."""
+        return max((c.pressure_difference for c in self._contacts), default=0.0)
 
     def renew(self, new: State) -> bool:
         """Open points in tension, and store the pressures of a state at a target; True: solve for it again."""

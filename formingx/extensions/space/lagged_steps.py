@@ -59,6 +59,7 @@ class LaggedLimits:
 
 LAGGED = LaggedLimits()
 
+_SLOW = 0.5                # ratio of successive differences of the pressure, from which on corrections are halved
 _SHORTENINGS = 50          # of a step until its predicted change of pressure is that of the limit
 
 
@@ -70,6 +71,7 @@ class LaggedApproach(Approach):
 
     def __init__(self, face: FaceContact, conducts: bool):
         super().__init__(face, conducts)
+        self.pressure_difference = np.inf                   # relative, of the last correction of the present step
         self._last: tuple[np.ndarray, float, PassedPoint | None] | None = None        # result of `passed`, and where
 
     def _within_motion(self, start: np.ndarray, velocity: np.ndarray, free: np.ndarray, length: float) -> float:
@@ -176,6 +178,8 @@ class LaggedApproach(Approach):
 
         Gaps close at a target or with lagged friction. sweep: number of earlier calls for this step.
         """
+        if sweep == 0:
+            self.pressure_difference = np.inf
         late = (at_target or self.has_lagged_friction) and self._close_penetrated(fields, control)
         return (sweep < LAGGED.max_corrections and self.update_pressure(fields, control)) | late
 
@@ -217,11 +221,23 @@ class LaggedApproach(Approach):
         if not self.has_lagged_friction:
             return False
         face, law = self.face, self.face.law
-        now = face.tractions(new, control).normal
-        if self._pressure_difference(now, law.friction_pressure(face.history)) <= LAGGED.max_pressure_difference:
+        now, before = face.tractions(new, control).normal, law.friction_pressure(face.history)
+        difference = self._pressure_difference(now, before)
+        if difference <= LAGGED.max_pressure_difference:
             return False
-        face.set_closures(law.closure_at_pressure(face.history, now))
+        share = self._share(difference)
+        face.set_closures(law.closure_at_pressure(face.history, share * now + (1 - share) * before))
         return True
+
+    def _share(self, difference: float) -> float:
+        """Return the share of the latest pressure in the next one, and store the difference between both.
+
+        It is 1/2 where the difference of the correction before has not been halved: with much friction the pressure
+        would alternate.
+        """
+        share = 1.0 if difference < _SLOW * self.pressure_difference else 0.5
+        self.pressure_difference = difference
+        return share
 
     def renew_pressure(self, new: np.ndarray, control: float) -> bool:
         """Replace the stored contact pressure by that of a state at a target, owned unknowns, shape (n,).
@@ -235,12 +251,15 @@ class LaggedApproach(Approach):
             return False
         old, depth = variables.history, np.maximum(law.distance(face.positions(new, control)), 0.0)
         history = old._replace(distance=np.where(law.in_contact(old), depth, old.distance), closure=old.position)
-        now = law.pressure(history)
-        sums = np.array([face.rule.area @ np.abs(now - law.friction_pressure(old)), face.rule.area @ now])
+        now, before = law.pressure(history), law.friction_pressure(old)
+        sums = np.array([face.rule.area @ np.abs(now - before), face.rule.area @ now])
         change, pressure = combined(self._comm, sums, MPI.SUM)
-        if change <= LAGGED.max_target_difference * (pressure + LAGGED.min_force * face.force_scale):
+        difference = float(change / (pressure + LAGGED.min_force * face.force_scale))
+        if difference <= LAGGED.max_target_difference:
             return False
-        face.put(variables._replace(history=history))
+        share = self._share(difference)
+        face.put(variables._replace(history=history._replace(distance=np.where(
+            law.in_contact(old), share * depth + (1 - share) * before / law.k, old.distance))))
         return True
 
     def _within_pressure_change(self, start: np.ndarray, velocity: np.ndarray, length: float) -> float:
