@@ -288,6 +288,26 @@ def test_targets_that_cannot_be_met(make, target, words):
         fx.trace(scene, until=other, intermediate=[target], progress=False)
 
 
+@pytest.mark.parametrize("target, words", [
+    (fx.travel(0.1), "this stage does not drive that"), (fx.travel(0.1, of="plug"), "this stage does not drive that"),
+    (fx.temperature(90.0, at=(0.0, 0.0)), "the temperature of the scene does not change")])
+def test_stages_whose_targets_are_refused(target, words):
+    """What `check` calls serious, a process refuses, in the same words."""
+    scene, stages = test_process.plugged(), [fx.Stage("blow", control="air", until=target)]
+    finding, = (f for f in fx.check(scene, stages=stages).findings if f.severity == "serious")
+    assert re.search(words, finding.text)
+    with pytest.raises(fx.InputError, match=re.escape(finding.text)):
+        fx.Process(scene).run(stages, progress=False)
+
+
+def test_a_sheet_in_space_has_no_pole():
+    scene = fx.Scene(mesh=fx.mesh.tube(radius=10.0, length=40.0, elements=(4, 2), part="quarter", end="closed"),
+                     thickness=1.0, materials=fx.NeoHookean(c10=0.4), loads=[fx.Pressure("inner")],
+                     supports=[fx.Clamped("neck"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])
+    found = [f for f in fx.check(scene, targets=[fx.pole_height(1.0)]).findings if f.severity == "serious"]
+    assert ["the pole needs a boundary named 'axis'" in f.text for f in found] == [True]
+
+
 @pytest.mark.parametrize("friction", [0.3, "stick"])
 def test_a_tool_with_friction_on_a_flat_sheet_alone_is_pushed_back(friction):
     """Its force grows with its travel, and never falls below 0."""

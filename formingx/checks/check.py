@@ -1,6 +1,7 @@
 """Check of a scene before its run, or of a finished run; a sound scene has no findings."""
 
 from collections.abc import Sequence
+from typing import Any
 
 from ..errors import InputError, as_list, check_type
 from ..findings import Finding, findings_at, without_notes, worst_first
@@ -9,7 +10,7 @@ from ..results.path import Path
 from ..scene import clearance
 from ..scene.scene import Scene
 from ..solve.branches import ANOTHER_PATH
-from ..solve.stage import Stage, plan
+from ..solve.stage import Plan, Stage, plan
 from ..units import NONE, Units
 from . import end_of_run, failed_run, parallel, promised_walls, ranges, scenes, tool_contact, vents
 from .sizes import SizedBody
@@ -91,18 +92,29 @@ def check(scene: Scene | Path, *, targets: Sequence[Target] = (), stages: Sequen
     for stage in stages:
         check_type("check: stages: stage", stage, Stage, "a formingx.Stage")
     body = SizedBody(scene, targets, stages, units)
-    return Report([*findings_at("scene", body), *findings_at("start", body), *_overlaps(scene, targets, stages)])
+    return Report([*findings_at("scene", body), *findings_at("start", body), *_refusals(scene, targets, stages)])
 
 
-def _overlaps(scene: Scene, targets: Sequence[Target], stages: Sequence[Stage]) -> list[Finding]:
-    """Return a serious finding in a list if two tools overlap on the way to a target or in a stage; else []."""
+def _refusals(scene: Scene, targets: Sequence[Target], stages: Sequence[Stage]) -> list[Finding]:
+    """Return serious findings: two tools overlap on the way to a target or in a stage, or a stage is refused."""
     try:
         for target in targets:
             clearance.check_target(scene, target)
-        clearance.check(scene, [plan(scene, stage) for stage in stages])
+        plans = [plan(scene, stage) for stage in stages]
+        clearance.check(scene, plans)
     except InputError as error:
         return [Finding("serious", "tools", str(error))]
-    return []
+    return [Finding("serious", "stages", f"{step.stage.label}: target {target}: this stage does not drive that")
+            for step in plans for target in _not_driven(scene, step)]
+
+
+def _not_driven(scene: Scene, step: Plan) -> list[Target]:
+    """Return the targets of a stage that are pressures or travels which it does not drive."""
+    def names(items: Sequence[Any]) -> set[str]:
+        return {name for item in items for name in (item.quantity, f"{item.name}_{item.quantity}")}
+    moving = names([scene.items[i] for i in (*step.numbers, *(i for i, _ in step.tables))])
+    wanted = [*step.stage.intermediate, *([step.stage.until] if step.stage.until is not None else [])]
+    return [target for target in wanted if target.name in names(scene.drivable) - moving]
 
 
 def before_run(scene: Scene, targets: Sequence[Target] = (), stages: Sequence[Stage] = ()) -> list[Finding]:

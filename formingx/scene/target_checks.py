@@ -33,6 +33,11 @@ def unreachable(scene: Scene, target: Any, inactive: Collection[int] | None = No
     name, value, driven = target.name, target.value, scene.driven
     active = [item for i, item in enumerate(scene.items) if i not in (inactive or ())]
     moulds = [item for item in active if item in scene.contacts and not item.driven]
+    if name in ("pole_height", "pole_stretch") and "axis" not in scene.first.mesh.boundaries:
+        return (f"the pole needs a boundary named 'axis'; the mesh has {list(scene.first.mesh.boundaries)}: elsewhere"
+                f" take displacement(..., at=..., component=...)")
+    if name == "temperature" and scene.heat is None:
+        return "the temperature of the scene does not change: give Scene heat=fx.Cooling(...)"
     if name == "pole_stretch" and scene.kinematics.axisymmetric:
         largest, material = max(((m.largest_stretch("equibiaxial"), m) for m in scene.materials.values()),
                                 key=lambda found: found[0])
