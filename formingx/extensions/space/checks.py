@@ -23,6 +23,7 @@ from .wall import nearest_triangles, thinnest_triangle
 
 _UNBALANCED = 0.02         # share of the resultant of the loads that supports and tools may miss
 
+_UNLOADED = 1e-6           # force over shear modulus, volume and length, below which a body counts as unloaded
 _LEAST_RESULTANT = 1e-3    # of loads, over the sum of the forces at all nodes, to which missed forces are compared
 
 _SLACK = 1e-4              # pressure over its target below which a sheet carries no load yet
@@ -107,7 +108,9 @@ def unbalanced_loads(path: Any) -> Iterator[Finding]:
                     for face in problem.contact.faces)
     missed, planes = tools - supports - loads, [plane.axis for plane in path.scene.symmetry.planes]
     missed[planes] = loads[planes] = 0.0                      # balanced by the mirror image
-    largest = max(float(np.linalg.norm(loads)), _LEAST_RESULTANT * each, 1e-300)         # in a tube they balance
+    largest = max(float(np.linalg.norm(loads)), _LEAST_RESULTANT * each)                 # in a tube they balance
+    if largest < _UNLOADED * scale:
+        largest = max(float(np.linalg.norm(tools)), _UNLOADED * scale)
     share = float(np.linalg.norm(missed)) / largest
     if share > _UNBALANCED:
         yield Finding("warning", "forces", f"the forces on supports and tools miss the resultant of the loads by"
