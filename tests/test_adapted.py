@@ -7,6 +7,7 @@ import pytest
 
 import formingx as fx
 from formingx.extensions.adapt.column_factors import column_factors
+from formingx.extensions.adapt.sizes import rounded
 
 PLUG = fx.tools.male(radius=3.0, height=60.0, base=-60.0, fillet=0.5).mirrored().moved(z=0.5)
 
@@ -120,6 +121,14 @@ def test_force_of_a_block_compressed_to_a_twentieth_is_exact():
     assert path["penetration"][-1] < 1e-3 * 0.05 and path.problem.symmetric
     assert abs(pressed().last.measures["tool_force"] / exact - 1) > 1e-2
     assert path.value("tool_force", path.states[-2]) == pytest.approx(path.states[-2].measures["tool_force"], rel=1e-12)
+
+
+def test_sizes_of_triangles_do_not_depend_on_round_off():
+    """Two computers, or one that rounds otherwise, make the same mesh: another has other walls by a percent."""
+    sizes = np.random.default_rng(0).uniform(0.5, 20.0, 2000)
+    found = rounded(sizes)
+    assert found == pytest.approx(sizes, rel=5e-3) and len(np.unique(found)) > 200
+    assert np.array_equal(rounded(found * (1 + 1e-10)), found) and np.array_equal(rounded(found * (1 - 1e-10)), found)
 
 
 def test_wrong_arguments_of_adapted_are_refused():

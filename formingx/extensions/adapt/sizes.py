@@ -38,7 +38,13 @@ def required_sizes(path: Any, max_rotation: float | None, error: float | None) -
     np.minimum.at(smallest_factor, wall.triangles.ravel(), np.repeat(factor, 3))
     size = wall.to_nodes(np.sqrt(wall.reference_area / (np.sqrt(3) / 4)))         # of equilateral triangles
     points = wall.reference_points
-    return points[:, :COORDINATES], _graded(points, wall.triangles, size * smallest_factor)
+    return points[:, :COORDINATES], rounded(_graded(points, wall.triangles, size * smallest_factor))
+
+
+def rounded(sizes: np.ndarray) -> np.ndarray:
+    """Return sizes, shape (n,), to three digits: gmsh makes other triangles even where round-off changes a size."""
+    last = 10.0 ** (np.floor(np.log10(sizes)) - 2)
+    return np.round(sizes / last) * last
 
 
 def _neighbours(triangles: np.ndarray) -> np.ndarray:
