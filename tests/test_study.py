@@ -240,6 +240,18 @@ def test_sobol_indices_of_a_polynomial():
         study.sensitivities("z")
 
 
+def test_studies_of_one_value_or_no_run():
+    """A single variable causes the whole variance; without a range or a run there is a message."""
+    study = fake_study([({"a": a}, {"y": a**2}) for a in (1.0, 2.0, 3.0, 4.0)], {"y": "max"})
+    found = study.sensitivities("y")
+    assert found.total == found.first == {"a": 1.0} and found.deviation < 1e-9
+    with pytest.raises(fx.InputError, match="no variable was varied: give ranges"):
+        fake_study([({"a": 1.0}, {"y": 1.0})], {"y": "max"}).refine(evaluations=2)
+    study.runs.clear()
+    with pytest.raises(fx.InputError, match="no run succeeded"):
+        study.effects("y")
+
+
 def test_pareto_front_of_the_goal_ends_its_line_at_a_gap():
     rows = [({"x": x}, {"a": x, "b": 1 - x}) for x in (0.0, 0.1, 0.2, 0.3, 0.9, 1.0)]
     study = fake_study(rows, {"a": "max", "b": "max"})

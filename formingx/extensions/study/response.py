@@ -75,10 +75,12 @@ def sobol(runs: Sequence[Any], variables: Sequence[str], measure: str) -> Sensit
     coefficients = inverse @ y
     leverage = np.minimum(np.einsum("ij,ji->i", matrix, inverse), 1 - 1e-9)
     left_out = (y - matrix @ coefficients) / (1 - leverage)
-    found = stats.sobol_indices(
-        func=lambda points: (terms(points.T, order) @ coefficients)[None], n=_SAMPLES,
-        dists=[stats.uniform(-1, 2)] * len(names), rng=np.random.default_rng(0))
-    first, total = (np.clip(np.atleast_2d(v)[0], 0.0, None) for v in (found.first_order, found.total_order))
+    first = total = np.ones(1)                               # of a single variable, which SciPy refuses
+    if len(names) > 1:
+        found = stats.sobol_indices(
+            func=lambda points: (terms(points.T, order) @ coefficients)[None], n=_SAMPLES,
+            dists=[stats.uniform(-1, 2)] * len(names), rng=np.random.default_rng(0))
+        first, total = (np.clip(np.atleast_2d(v)[0], 0.0, None) for v in (found.first_order, found.total_order))
     ranked = np.argsort(-total)
     return Sensitivities(measure, {names[k]: float(first[k]) for k in ranked},
                          {names[k]: float(total[k]) for k in ranked},

@@ -125,9 +125,11 @@ class Study(ColumnTable):
             {variable: {level: mean over the runs at this level}}.
 
         Raises:
-            InputError: an unknown measure.
+            InputError: an unknown measure, or no successful run.
         """
         self._checked_measure(measure)
+        if not self.successful:
+            raise InputError("Study.effects: no run succeeded: print(study) says why")
         values = np.array([run.measures[measure] for run in self.successful])
         levels = {name: sorted({run.values[name] for run in self.successful}) for name in self.variables}
         masks = {name: np.array([[run.values[name] == level for level in tried] for run in self.successful], float)
@@ -216,7 +218,7 @@ class Study(ColumnTable):
             The best run.
 
         Raises:
-            InputError: no goal, no successful run, or an unknown variable.
+            InputError: no goal, no successful run, no range, or an unknown variable.
         """
         from scipy.optimize import minimize
         start, evaluations = self.best, count("refine: evaluations", evaluations)
@@ -225,6 +227,8 @@ class Study(ColumnTable):
             if len(levels := {run.values[name] for run in self.runs}) > 1}
         for name in within:
             check_name("refine: variable", name, self.variables)
+        if not within:
+            raise InputError("refine: no variable was varied: give ranges, as within={name: (lowest, highest)}")
         low, high = np.array(list(within.values()), dtype=float).T
         worst = max(map(self._cost, self.successful))
 
