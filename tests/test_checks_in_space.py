@@ -107,3 +107,13 @@ def test_a_plug_that_takes_the_sheet_along_is_reported(separates, stages, found)
     scene = disc(contacts=[plug_above(separates)], model=fx.Membrane(wrinkles=0.01))
     texts = [finding.text for finding in fx.check(scene, stages=stages).findings]
     assert any("'plug' moves back and takes the sheet along" in text for text in texts) == found
+
+
+@pytest.mark.parametrize("thickness", [1e-4, lambda x, y: 1e-4 + 0 * x])
+def test_pressures_are_compared_to_the_thickness_of_a_sheet(thickness):
+    """A thin sheet needs little pressure: half of shear modulus x thickness / length has an effect."""
+    scene = fx.Scene(mesh=fx.mesh.sheet(fx.mesh.circle(100.0), size=20.0), thickness=thickness,
+                     loads=[fx.Pressure("top")], materials=fx.NeoHookean(c10=0.5), supports=[fx.SimplySupported("rim")])
+    assert fx.check(scene, targets=[fx.pressure(5e-7)]).healthy
+    found, = fx.check(scene, targets=[fx.pressure(5e-12)]).findings
+    assert "thickness / length = 5e-07" in found.text

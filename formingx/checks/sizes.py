@@ -7,6 +7,7 @@ from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
+from mpi4py import MPI
 
 from ..errors import InputError
 from ..findings import Finding, coordinates, register
@@ -14,6 +15,7 @@ from ..materials.inflation import FreeInflation, Peak, first_peak
 from ..measures.targets import Target
 from ..mesh.triangles import Triangles
 from ..physics.contact import Contact
+from ..ranks import combined
 from ..scene.contact_checks import OTHER_UNIT
 from ..scene.scene import Scene
 from ..solve.stage import Plan, Stage, plan
@@ -72,7 +74,13 @@ class SizedBody(Triangles):
         self.scene = scene
         self._units = units.per_depth() if scene.kinematics.dimension_of_volume == 2 else units
         self.moduli = {name: scene.shear_modulus(name) for name in scene.materials}
-        self.pressure_scale = max(self.moduli.values()) * self.thickness / self.length
+        thickness = self.thickness
+        if scene.kinematics.components == 3:
+            x = np.asarray(scene.mesh.domain.geometry.x).T
+            sums = np.array([sum(float(np.sum(h(*x))) for h in scene.thickness.values()), x.shape[1]])
+            total, nodes = combined(scene.mesh.comm, sums, MPI.SUM)
+            thickness = float(total / nodes)
+        self.pressure_scale = max(self.moduli.values()) * thickness / self.length
         self.prescribed = [entry for target in targets for entry in self._prescribed_values(target, scene.driven)]
         self.has_targets, self.stages = bool(targets or stages), stages
         self.targets = [*targets, *(t for stage in stages for t in (*stage.intermediate, stage.until) if t)]
