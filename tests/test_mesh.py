@@ -289,3 +289,8 @@ def test_a_mesh_prints_no_round_off():
     path = fx.trace(treloar((6, 1)), until=fx.pole_height(0.6), progress=False)
     for mesh in (path.deformed_mesh(), path.deformed_mesh(size=0.05)):
         assert "R from 0 to" in str(mesh)
+
+
+def test_elements_of_layers_are_a_list_not_a_mapping():
+    with pytest.raises(fx.InputError, match="a list with an entry for each layer, from the bottom up"):
+        fx.mesh.disc(radius=10.0, thickness={"skin": 0.1, "core": 0.2}, elements=(10, {"skin": 1, "core": 2}))

@@ -75,6 +75,9 @@ def divisions(kind: str, along_what: str, elements: Any, layers: int) -> tuple[i
     if not is_sequence(elements) or len(elements) != 2:
         raise InputError(f"{kind}: elements = {elements!r}: must be (along the {along_what}, through each layer)")
     along = count(f"{kind}: elements along the {along_what}", elements[0])
+    if isinstance(elements[1], Mapping):
+        raise InputError(f"{kind}: elements through the layers = {elements[1]!r}: must be a number, or a list with an"
+                         f" entry for each layer, from the bottom up")
     through = list(elements[1]) if is_sequence(elements[1]) else [elements[1]] * layers
     if layers == 1 and len(through) > 1:
         through = [through]
