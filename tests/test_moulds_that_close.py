@@ -280,6 +280,19 @@ def test_programme_of_the_wall_gives_the_wanted_minimum_wall():
         fx.wall_programme(build, 0.7, start=9.0, low=1.0, high=6.0)
 
 
+def test_a_programme_whose_bounds_are_too_low_ends_at_them():
+    tube = fx.mesh.tube(radius=10.0, length=40.0, elements=(6, 2), part="quarter", end="closed")
+
+    def build(wall):
+        given = fx.Scene(mesh=tube, thickness=lambda x, y, z: wall(tube.arc_length(x, y, z) / 45.7),
+                         materials=fx.NeoHookean(c10=0.5), loads=[fx.Pressure("inner")],
+                         supports=[fx.Clamped("neck"), fx.Symmetry("x0", "x"), fx.Symmetry("y0", "y")])
+        return given, fx.enclosed_volume(6000.0)
+    found = fx.wall_programme(build, 5.0, start=1.0, low=0.5, high=2.0, knots=3)
+    assert found.bounded and not found.converged and len(found.tried) <= 4 and np.all(found.thickness == 2.0)
+    assert "not converged: the thickness is at its bounds" in str(found)
+
+
 def test_a_sharp_ridge_is_named_before_a_sheet_slides():
     """The shoulder of a square bottle is narrower than the centres of its corners: its sides meet sharply."""
     mesh = fx.mesh.tube(radius=16.0, length=172.0, elements=(40, 10), part="quarter", end="closed")

@@ -31,6 +31,7 @@ class WallProgramme(KeyNumbers):
         wanted: wanted minimum wall, length.
         converged: True if the minimum wall is within the tolerance of the wanted one.
         units: units of the labels.
+        bounded: True if the search ended because the next thickness would be the same, at the bounds.
     """
 
     thickness: np.ndarray
@@ -40,12 +41,14 @@ class WallProgramme(KeyNumbers):
     wanted: float
     converged: bool
     units: Units = NONE
+    bounded: bool = False
 
     @property
     def rows(self) -> list[tuple[str, str]]:
         """Rows of the printed table: pairs (name, value with its unit)."""
         volume, first = self.path.part().volume, float(self.tried[0].mean())
-        return [("runs", f"{len(self.tried)}{'' if self.converged else ', not converged'}"),
+        state = "" if self.converged else ", not converged" + ": the thickness is at its bounds" * self.bounded
+        return [("runs", f"{len(self.tried)}{state}"),
                 ("wanted minimum wall", self._length(self.wanted)),
                 ("minimum wall", f"{self._length(float(self.min_walls[-1]))}, at first {self.min_walls[0]:.5g}"),
                 ("thickness at the knots, from the neck", ", ".join(f"{t:.4g}" for t in self.thickness)),
@@ -106,7 +109,7 @@ def wall_programme(build: Callable[[Callable], tuple[Any, Any]], min_wall: float
         raise InputError(f"wall_programme: knots = {knots!r} and damping = {damping!r}: must be at least 2, and above 0"
                          f" and at most 1")
     s = np.linspace(0.0, 1.0, number)
-    values, tried, walls, path = np.full(number, t0), [], [], None
+    values, tried, walls, path, bounded = np.full(number, t0), [], [], None, False
     for run in range(1, count("wall_programme: max_runs", max_runs) + 1):
         try:
             found = _run(*build(lambda x, t=values: np.interp(x, s, t)))
@@ -129,8 +132,10 @@ def wall_programme(build: Callable[[Callable], tuple[Any, Any]], min_wall: float
         local = np.array([wall.wall[nearest == k].min(initial=np.inf) for k in range(number)])
         factor = np.where(np.isfinite(local), (wanted / local) ** damping, 1.0)
         values = np.clip(values * factor, *bounds)
+        if bounded := np.array_equal(values, tried[-1]):
+            break
     return WallProgramme(tried[-1], path, np.array(tried), np.array(walls), wanted,
-                         abs(walls[-1] / wanted - 1) <= allowed, units)
+                         abs(walls[-1] / wanted - 1) <= allowed, units, bounded)
 
 
 def _run(scene: Any, until: Any) -> Any:
