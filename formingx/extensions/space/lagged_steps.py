@@ -59,7 +59,7 @@ class LaggedLimits:
 
 LAGGED = LaggedLimits()
 
-_SLOW = 0.5                # ratio of successive differences of the pressure, from which on corrections are halved
+_SLOW = 0.7                # ratio of successive differences of the pressure, from which on corrections are halved
 _SHORTENINGS = 50          # of a step until its predicted change of pressure is that of the limit
 
 
@@ -232,8 +232,8 @@ class LaggedApproach(Approach):
     def _share(self, difference: float) -> float:
         """Return the share of the latest pressure in the next one, and store the difference between both.
 
-        It is 1/2 where the difference of the correction before has not been halved: with much friction the pressure
-        would alternate.
+        It is 1/2 where the correction before has hardly reduced the difference: with much friction the pressure would
+        alternate.
         """
         share = 1.0 if difference < _SLOW * self.pressure_difference else 0.5
         self.pressure_difference = difference
