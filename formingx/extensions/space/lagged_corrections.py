@@ -59,8 +59,8 @@ class LaggedCorrections:
                 first = first or (new, variables, self._difference())
                 if sweep > LAGGED.max_solutions / 2:
                     if self._difference() >= first[-1]:
-                        log.info("the contact pressure at %s stays that of the first solution: from one solution to the"
-                                 " next it changes more and more", new.target)
+                        log.warning("the contact pressure at %s stays that of the first solution: in further ones it"
+                                    " changes more and more; use smaller triangles, or less friction", new.target)
                         new, variables, _ = first
                     curve.problem.history.variables = variables
                     return new
